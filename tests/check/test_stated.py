@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from gonio import cli
 from gonio.check import Finding, reference
-from gonio.errors import InputError
 
 from . import solutions as of
 from .solutions import Phong
@@ -128,22 +127,6 @@ def test_a_constant_that_is_another_parameter_is_no_mistake(tmp_path: Path) -> N
         path.write_text(_written(text, ""))
         finding = go.check(path, text.partition("(")[0])
         assert finding.passed and "albedo=0.6, found from the values" in finding.remark, finding.lines()
-
-
-def test_values_that_are_not_finite_are_wrong(tmp_path: Path) -> None:
-    lines = _written("lambert(albedo=0.5)", "").splitlines()
-    lines[16] = ",".join([*lines[16].split(",")[:6], "nan", "0", "0"])
-    path = tmp_path / "f.csv"
-    path.write_text("\n".join(lines))
-    finding = go.check(path, "lambert")
-    assert finding.exit_code == 1 and "1 of 200 rows are not finite: line 17, f nan, 0, 0" in finding.facts[0]
-    for column, word in ((6, "oops"), (5, "nan")):
-        words = lines[16].split(",")
-        words[column] = word
-        path.write_text("\n".join([*lines[:16], ",".join(words), *lines[17:]]))
-        with pytest.raises(InputError, match=f"'{word}' given") as error:
-            go.check(path, "lambert")
-        assert error.value.where == "f.csv:17"
 
 
 @pytest.mark.slow

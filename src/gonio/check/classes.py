@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..material import BSDF
+from ..measure.formats.rows import Pairs
 from ..verify import directions
 from . import samples
 from .finding import Finding
@@ -31,7 +32,7 @@ def check(name: str, given: BSDF, model: BSDF, accuracy: float | None = None) ->
         row = int(np.flatnonzero(~np.isfinite(f).all(axis=1))[0])
         what = f"f is NaN or infinite at wo {directions.text(wo[row])}, wi {directions.text(wi[row])} degrees"
         raise InputError(what, name, "guard the division, or the root of a number below 0")
-    rows = samples.Rows(wo, wi, f, list(range(1, len(wo) + 1)))
+    rows = Pairs(wo, wi, f, list(range(1, len(wo) + 1)))
     finding = samples.judge(name, rows, model, ACCURACY if accuracy is None else accuracy, "a material")
     return _with_angles(finding, wo, wi)
 

@@ -1,25 +1,16 @@
-"""Text files with values of f from any program: rows of wo, wi and f, compared with a material row by row.
-
-    # wo.x wo.y wo.z   wi.x wi.y wi.z   f (one or three channels)
-    0.36, -0.48, 0.8,  0.0, 0.6, 0.8,   0.1507
-
-Commas, semicolons, tabs or spaces separate the numbers; empty lines and lines that start with # are skipped, and the
-first line may name the columns. Five columns are theta_o, phi_o, theta_i, phi_i in degrees, and f.
-"""
+"""Files with values of f from any program (`measure.formats.rows`), compared with a material row by row."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
 from ..material import BSDF
-from ..measure.formats import text
-from ..verify import directions
+from ..measure.formats import rows as files
+from ..measure.formats.rows import Pairs
 from . import causes, search
 from .finding import RIGHT, WRONG, Finding, Mistake
 from .mistakes import Values, f_of
@@ -28,20 +19,9 @@ from .stated import Asked, degenerate
 
 ACCURACY = 2e-3  # relative; allows for float32, six printed digits and angles from inverse trigonometric functions
 GRAZING = 1e-3  # cosine below which a division by it is inaccurate
-UNIT = 1e-3  # largest deviation of a direction's length from 1
 _COSINE = "the values are f cos theta_i, as in the sheet's equation 1"
 _NEARER = "compared with f cos theta_i, which is nearer to the values than f"
 COVER = 0.99  # fraction of the rows that must agree; the others must agree within ten times the accuracy
-_UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that become x, y and z, as rotations
-
-
-class Rows(NamedTuple):
-    """Directions (N, 3) with z up, values (N, 1 or 3), and the line number of each row."""
-
-    wo: Values
-    wi: Values
-    f: Values
-    line: list[int]
 
 
 def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None) -> Finding:
@@ -57,7 +37,7 @@ def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None
     rows = read(path, up)
     accuracy = ACCURACY if accuracy is None else accuracy
     finding = judge(path.name, rows, asked.material, accuracy)
-    if (finding.passed and asked.defaults) or not np.isfinite(rows.f).all():
+    if finding.passed and asked.defaults:
         return finding
     other = _explaining(path.name, rows, asked.material, accuracy) if asked.defaults else None
     if other is None:
@@ -69,7 +49,7 @@ def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None
     return replace(judge(path.name, rows, other, accuracy), remark=remark)
 
 
-def _explaining(name: str, rows: Rows, material: BSDF, accuracy: float) -> BSDF | None:
+def _explaining(name: str, rows: Pairs, material: BSDF, accuracy: float) -> BSDF | None:
     """The material with parameters that explain the values; None if there are none, or if they reduce it to a simpler
     model."""
     fine = np.minimum(rows.wo[:, 2], rows.wi[:, 2]) > GRAZING
@@ -83,7 +63,7 @@ def _explaining(name: str, rows: Rows, material: BSDF, accuracy: float) -> BSDF 
     return None
 
 
-def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kind: str = "values of f") -> Finding:
+def judge(name: str, rows: Pairs, material: BSDF, accuracy: float = ACCURACY, kind: str = "values of f") -> Finding:
     """Compare values of f with a material's, row by row.
 
     accuracy  relative difference that counts as equal
@@ -100,11 +80,6 @@ def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kin
     if not fine.any() or not (np.any(expected[fine]) or np.any(rows.f)):
         raise InputError("every row is at or below the horizon", name, "give directions above the surface, or --up y")
     figures = {"rows": float(len(rows.f)), "accuracy": accuracy}
-    undefined = np.flatnonzero(~np.isfinite(rows.f).all(axis=1))
-    if len(undefined):
-        first = f"line {rows.line[undefined[0]]}, f {_numbers(rows.f[undefined[0]])}"
-        fact = f"{len(undefined)} of {len(rows.f)} rows are not finite: {first}"
-        return Finding(name, kind, WRONG, (fact,), Mistake("a division by 0, or a root of a negative number", "NaN"))
     facts: list[str] = []
     if _agree(rows.f, expected, fine, accuracy):
         pass
@@ -135,12 +110,12 @@ def judge(name: str, rows: Rows, material: BSDF, accuracy: float = ACCURACY, kin
     return Finding(name, kind, RIGHT, tuple(facts), None, figures)
 
 
-def _mistake(rows: Rows, expected: Values, material: BSDF, fine: np.ndarray, accuracy: float) -> Mistake | None:
+def _mistake(rows: Pairs, expected: Values, material: BSDF, fine: np.ndarray, accuracy: float) -> Mistake | None:
     both = causes.ratio(material, rows.wo[fine], rows.wi[fine], rows.f[fine], expected[fine], accuracy)
     return causes.named(both)
 
 
-def _has_cosine(rows: Rows, expected: Values, fine: np.ndarray, accuracy: float) -> bool:
+def _has_cosine(rows: Pairs, expected: Values, fine: np.ndarray, accuracy: float) -> bool:
     """Whether wrong values are nearer to f cos theta_i than to f: they agree in more rows, or in as many with a smaller
     median difference."""
 
@@ -180,59 +155,12 @@ def _numbers(values: Values) -> str:
     return ", ".join(f"{x:.6g}" for x in values)
 
 
-def read(path: Path, up: str = "z") -> Rows:
+def read(path: Path, up: str = "z") -> Pairs:
     """The rows of a file, converted from the axis `up` to z up. Raises InputError, with the line, if it is damaged."""
-    if up not in _UP:
+    if up not in files.UP:
         raise InputError(f"unknown axis '{up}'", "--up", "give the axis along the normal: z, y or x")
     try:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", str(path), "check the path") from None
-    where = path.name
-    table = _split(text.lines(data, where))
-    if not table:
-        raise InputError("no rows of numbers", where, "write rows of wo.x wo.y wo.z wi.x wi.y wi.z f")
-    width = len(table[0][1])
-    if width not in (5, 7, 9):
-        hint = (
-            "7 columns are wo, wi and f; 9 have f in three channels; 5 are theta_o, phi_o, theta_i, phi_i, f in degrees"
-        )
-        raise InputError(f"{width} columns given", where, hint)
-    values = text.table(table, width, where, finite=4 if width == 5 else 6)
-    lines = [line for line, _ in table]
-    if width == 5:
-        wo, wi = directions.at(values[:, 0], values[:, 1]), directions.at(values[:, 2], values[:, 3])
-        return Rows(wo, wi, values[:, 4:], lines)
-    wo, wi = (_directions(values[:, k : k + 3], name, lines, where) for k, name in ((0, "wo"), (3, "wi")))
-    return Rows(wo[:, _UP[up]], wi[:, _UP[up]], values[:, 6:], lines)
-
-
-def _split(lines: list[str]) -> list[tuple[int, list[str]]]:
-    """The line number and words of each row; comments and a heading are skipped."""
-    table: list[tuple[int, list[str]]] = []
-    for number, line in enumerate(lines, 1):
-        words = [word for word in re.split(r"[,;\s]+", line.strip()) if word]
-        if not words or words[0].startswith(("#", "//")):
-            continue
-        if not table and not _is_number(words[0]):
-            continue  # the names of the columns
-        table.append((number, words))
-    return table
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def _directions(w: Values, name: str, lines: list[int], where: str) -> Values:
-    length = np.linalg.norm(w, axis=1)
-    off = np.abs(length - 1.0)
-    worst = int(np.argmax(off))
-    if off[worst] > UNIT:
-        what = f"{name} of length {length[worst]:.4g} given, a unit vector expected"
-        raise InputError(what, f"{where}:{lines[worst]}", "normalize the directions")
-    return w / length[:, None]
+    return files.parsed(data, path.name, up)

@@ -16,6 +16,7 @@ from ..catalog.operands import Kind
 from ..errors import InputError
 from ..files import check_file, write_whole
 from ..measure import names_table, read
+from ..measure.formats.base import by_suffix
 from ..work import parts
 from .data import GRAZING, Data, data_of
 from .fit import Fit, fit, ranked
@@ -75,6 +76,7 @@ def files_of(named: Sequence[str]) -> list[str]:
         folder = Path(os.path.expanduser(text))
         if operands.kind_of(str(folder), {Kind.TABLE, Kind.FOLDER}, "DATA") is Kind.FOLDER:
             inside = sorted(str(path) for path in folder.iterdir() if names_table(path.name) and path.is_file())
+            inside = [path for path in inside if not by_suffix(path)[0].common]
             if not inside:
                 raise InputError("the folder contains no measurement file", text, "such as .binary, .bsdf or .gonio")
             paths += inside

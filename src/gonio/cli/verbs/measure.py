@@ -24,7 +24,9 @@ class Detector(Options):
 
     theta_i: Annotated[
         str | None,
-        Option(metavar="DEG", help="Angles of incidence, such as 0,30,60 or 0:85:5; for .gonio, .astm and .brdf."),
+        Option(
+            metavar="DEG", help="Angles of incidence, such as 0,30,60 or 0:85:5; for .gonio, .astm, .brdf and .csv."
+        ),
     ] = None
     theta_r: Annotated[str | None, Option(metavar="DEG", help="Viewing angles.")] = None
     phi: Annotated[str | None, Option(metavar="DEG", help="Azimuths between light and view, 0 to 180.")] = None

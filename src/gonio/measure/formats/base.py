@@ -29,6 +29,7 @@ class Format:
     suffixes: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[str] = ""
     several: ClassVar[bool] = False  # whether a file holds several materials
+    common: ClassVar[bool] = False  # whether other files often have its suffix: a folder's are not measurements
 
     def fits(self, data: bytes) -> bool:
         """Whether a file's contents are in this format; called if several formats share the file's suffix."""

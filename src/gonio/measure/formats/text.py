@@ -26,27 +26,25 @@ def lines(data: bytes, where: str) -> list[str]:
     return rows
 
 
-def numbers(words: list[str], where: str, line: int, finite: int | None = None) -> list[float]:
-    """Convert words to numbers. Raises InputError, which names file and line, if one is not, or if one of the first
-    `finite` numbers (None: all) is not finite."""
+def numbers(words: list[str], where: str, line: int) -> list[float]:
+    """Convert words to finite numbers. Raises InputError, which names file and line, if one is not."""
     values = []
-    for place, word in enumerate(words):
+    for word in words:
         try:
             number = float(word)
         except ValueError:
             raise InputError(f"'{word[:40]}' given, a number expected", f"{where}:{line}") from None
-        if not math.isfinite(number) and (finite is None or place < finite):
+        if not math.isfinite(number):
             raise InputError(f"'{word[:40]}' given, a finite number expected", f"{where}:{line}")
         values.append(number)
     return values
 
 
-def table(rows: list[tuple[int, list[str]]], width: int, where: str, finite: int | None = None) -> NDArray[np.float64]:
+def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[np.float64]:
     """Convert rows of words to numbers, (N, width).
 
-    rows    line number and words of each row
-    where   name of the file, for errors
-    finite  number of first columns that must be finite; None: all
+    rows   line number and words of each row
+    where  name of the file, for errors
     """
     for line, row in rows:
         if len(row) != width:
@@ -55,9 +53,9 @@ def table(rows: list[tuple[int, list[str]]], width: int, where: str, finite: int
         values = np.array([row for _, row in rows], dtype=np.float64)
     except ValueError:
         values = np.full((1, 1), np.nan)
-    if not np.all(np.isfinite(values[:, :finite])):
+    if not np.all(np.isfinite(values)):
         for line, row in rows:
-            numbers(row, where, line, finite)
+            numbers(row, where, line)
     return values.reshape(-1, width)
 
 
