@@ -72,8 +72,8 @@ def parsed(data: bytes, where: str, up: str = "z") -> Pairs:
 
 def comments(data: bytes) -> dict[str, str]:
     """The entries of comments such as `# up: y`, by key."""
-    found = (_COMMENT.match(line) for line in data.decode("utf-8-sig", "replace").splitlines())
-    return {match[1]: match[2] for match in found if match}
+    matches = (_COMMENT.match(line) for line in data.decode("utf-8-sig", "replace").splitlines())
+    return {match[1]: match[2] for match in matches if match}
 
 
 def _split(lines: list[str]) -> tuple[list[str], list[tuple[int, list[str]]]]:
