@@ -11,7 +11,7 @@ import pytest
 from gonio.catalog import notation
 from gonio.errors import InputError
 from gonio.material import models
-from gonio.viewer import curves, fresnel_figure, lobes, plots
+from gonio.viewer import curves, figures, fresnel_figure, lobes, plots
 
 METAL = '{"type": "conductor", "preset": "Au", "alpha": 0.3}'
 
@@ -184,3 +184,11 @@ def test_an_index_that_cannot_be_drawn_is_an_error(arguments: dict[str, Any], te
         go.plot("fresnel", **arguments)
     with pytest.raises(InputError, match="an index is given without fresnel"):
         go.plot("lambert", eta=1.5)
+
+
+def test_a_long_subtitle_stays_inside_the_figure() -> None:
+    for words in (8, 12, 18):
+        figure = figures.blank(7.4, 5.0, "title", "some words " * words)
+        for text in figure.texts:
+            assert text.get_window_extent().x1 <= figure.bbox.x1 - 10.0
+            assert text.get_window_extent().y0 >= figure.bbox.y1 - 0.85 * figure.dpi

@@ -9,6 +9,7 @@ import math
 import os
 import re
 import sys
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".pdf", ".svg")
+SUBTITLE = 9.5  # size of letters, points
 INK, SOFT, FAINT = "#1d2530", "#6b7683", "#d9dee4"
 CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green, blue, of equal weight on white
 # distinguishable for color-blind readers too
@@ -109,7 +111,9 @@ def _suffix(path: Path) -> str:
 
 
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
-    """An empty figure with a heading. It opens no window, whatever the backend.
+    """An empty figure with a heading, whose subtitle takes several lines if it is wider than the figure.
+
+    It opens no window, whatever the backend.
 
     width, height  size of the figure, inches
     """
@@ -121,7 +125,12 @@ def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
     FigureCanvasAgg(figure)
     left = 0.3 / width
     figure.text(left, 1 - 0.38 / height, title, fontsize=14, fontweight="bold", va="baseline")
-    figure.text(left, 1 - 0.62 / height, subtitle, fontsize=9.5, color=SOFT, va="baseline")
+    below = figure.text(left, 1 - 0.62 / height, subtitle, fontsize=SUBTITLE, color=SOFT, va="baseline")
+    excess = below.get_window_extent().width / figure.dpi / (width - 0.6)
+    if excess > 1.0:
+        longest = math.ceil(1.06 * len(subtitle) / math.ceil(0.9 * excess))
+        below.set_text("\n".join(textwrap.wrap(subtitle, longest)))
+        below.set(y=1 - 0.5 / height, va="top", fontsize=0.85 * SUBTITLE)
     return figure
 
 

@@ -14,6 +14,7 @@ from ..fitting.fit import Fit
 from ..measure import read
 from ..measure.tables.base import Measurement
 from ..measure.tables.half_difference import pair_at
+from ..measure.tables.samples import Samples
 from . import figures
 from .figures import Drawing
 
@@ -34,9 +35,11 @@ def draw(fit: Fit, table: str | Path | Measurement) -> Drawing:
     from matplotlib.figure import Figure
 
     source = table if isinstance(table, Measurement) else read(table)
+    name = "measured, interpolated" if isinstance(source, Samples) else "measured"
 
     def measured(wo: Floats, wi: Floats) -> Floats:
-        return source.rgb(wo, wi)
+        known = source.angular_range.holds(wo, wi)
+        return np.where(known[:, None], source.rgb(wo, wi), np.nan)
 
     def fitted(wo: Floats, wi: Floats) -> Floats:
         return np.asarray(fit.material.eval(wo, wi), np.float64)
@@ -44,15 +47,15 @@ def draw(fit: Fit, table: str | Path | Measurement) -> Drawing:
     with matplotlib.rc_context(figures.STYLE):
         figure = Figure(figsize=(10.0, 8.2), layout="constrained")
         axes = figure.subplots(3, 3)
-        _spheres(axes[0], measured, fitted)
+        _spheres(axes[0], source.rgb, fitted, name)  # beyond the measured angles, as in renders
         _slices(axes[1], measured, fitted)
-        _images(axes[2], measured, fitted)
+        _images(axes[2], measured, fitted, name)
         figure.suptitle("\n".join(textwrap.wrap(fit.text, 120)[:3]), fontsize=9)
         figure.supxlabel(f"{100.0 * fit.relative:.3g} % off on average, of {fit.count} values", fontsize=9)
     return Drawing(figure, str(fit))
 
 
-def _spheres(axes: list[Axes], measured: Values, fitted: Values) -> None:
+def _spheres(axes: list[Axes], measured: Values, fitted: Values, name: str) -> None:
     y, x = np.mgrid[1.0 : -1.0 : SIZE * 1j, -1.0 : 1.0 : SIZE * 1j]
     inside = x * x + y * y < 0.995
     normal = np.stack([x[inside], y[inside], np.sqrt(1.0 - x[inside] ** 2 - y[inside] ** 2)], -1)
@@ -73,7 +76,7 @@ def _spheres(axes: list[Axes], measured: Values, fitted: Values) -> None:
         picture[inside] = radiance
         pictures.append(picture)
     white = max(float(np.nanpercentile(pictures[0], 98.0)), 1e-6)
-    for axis, picture, title in zip(axes, pictures, ("measured", "fitted"), strict=False):
+    for axis, picture, title in zip(axes, pictures, (name, "fitted"), strict=False):
         shown = np.clip(np.nan_to_num(picture / white, nan=1.0), 0.0, 1.0) ** (1.0 / 2.2)
         axis.imshow(np.where(np.isnan(picture), 1.0, shown), interpolation="nearest")
         axis.set_title(f"{title}, one light", fontsize=10)
@@ -90,8 +93,8 @@ def _slices(axes: list[Axes], measured: Values, fitted: Values) -> None:
         for channel, color in enumerate(figures.CHANNELS):
             axis.semilogy(np.degrees(angles), a[:, channel], color=color, linewidth=1.6, alpha=0.45)
             axis.semilogy(np.degrees(angles), b[:, channel], color=color, linewidth=1.0, linestyle=figures.DASHES)
-        top = float(max(a.max(), b.max()))
-        axis.set_ylim(max(top * 1e-5, float(min(a.min(), b.min())) * 0.5), top * 2.0)
+        top, least = (float(extreme([a, b])) for extreme in (np.nanmax, np.nanmin))
+        axis.set_ylim(max(top * 1e-5, least * 0.5), top * 2.0)
         axis.set_title(f"viewed at {view:g} degrees", fontsize=10)
         axis.set_xlabel("angle of the light, degrees")
         axis.grid(True)
@@ -107,7 +110,7 @@ def _slices(axes: list[Axes], measured: Values, fitted: Values) -> None:
     axes[2].legend(handles=lines, loc="center left")
 
 
-def _images(axes: list[Axes], measured: Values, fitted: Values) -> None:
+def _images(axes: list[Axes], measured: Values, fitted: Values, name: str) -> None:
     """Images over theta_h (to the right, by its square root) and theta_d (upward), at phi_d = 90 degrees."""
     x, y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE, (np.arange(SIZE) + 0.5) / SIZE)
     theta_h, theta_d = x * x * (0.5 * np.pi), y * (0.5 * np.pi)
@@ -120,7 +123,7 @@ def _images(axes: list[Axes], measured: Values, fitted: Values) -> None:
         pictures.append(radiance.reshape(SIZE, SIZE, 3))
     # values span decades: the cube root approximates perceived lightness
     white = max(float(np.nanpercentile(np.cbrt(np.abs(pictures[0])), 97.0)), 1e-6)
-    for axis, image, title in zip(axes, pictures, ("measured", "fitted"), strict=False):
+    for axis, image, title in zip(axes, pictures, (name, "fitted"), strict=False):
         shown = np.where(np.isnan(image), 1.0, np.clip(np.cbrt(np.maximum(image, 0.0)) / white, 0.0, 1.0))
         axis.imshow(shown, origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto", interpolation="nearest")
         axis.set_title(f"{title}, f by its cube root", fontsize=10)

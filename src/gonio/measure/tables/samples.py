@@ -20,6 +20,7 @@ from .half_difference import HalfDifference, centres
 CELLS = (45, 30, 30)  # of the table that interpolates the samples
 NEIGHBORS = 24  # samples from which a cell is interpolated
 DARK = 1e-3  # fraction of the median value: separates absolute from relative differences
+AROUND = np.radians(10.0)  # smallest measured angle below which the normal lies among measured directions
 SAME = 1e-6  # distance of features below which samples are repeated measurements
 
 
@@ -73,8 +74,10 @@ class Samples(Guided, Measurement):
 
     @property
     def angular_range(self) -> AngularRange:
-        """The range of the two directions together, since a pair also represents its swapped pair."""
+        """The range of the two directions together, since a pair also represents its swapped pair; the normal is within
+        it if it lies among measured directions."""
         ends = np.sort(self.directions[:, [0, 2]], axis=None)
+        ends[0] = 0.0 if ends[0] < AROUND else ends[0]
         return of_nodes(ends, ends, np.zeros(0))
 
     # ------------------------------------------------------------------ as formulas
