@@ -217,8 +217,6 @@ def measure(
     rough = None if surface is None else _rough(surface, facet, detector, tracing, plan)
     specimen = rough or _model(material, detector)
     measured, hidden, notes = _filled(plan, specimen, detector, tracing.seed)
-    if isinstance(specimen, Model) and specimen.material.transmits:
-        notes.append("the material also transmits light, which is not measured: tables contain reflected light only")
     notes += _lost(measured, specimen) + ([] if target is None else _written(measured, plan, target))
     return _readout(measured, specimen, path, "" if path is None else plan.file.name, hidden, notes, begun)
 
@@ -263,15 +261,22 @@ def _model(material: MaterialLike | None, detector: Detector) -> Model:
 
 
 def _lost(measured: Measurement, specimen: Specimen) -> list[str]:
-    """A note if a material is not reciprocal, but its table has one value for both orders of a pair of directions."""
-    if not (measured.reciprocal and isinstance(specimen, Model)):
+    """Notes on properties of a material that its table cannot have: transmission, and different values for the two
+    orders of a pair of directions."""
+    if not isinstance(specimen, Model):
         return []
+    notes = []
+    if specimen.material.transmits:
+        notes.append("the material also transmits light, which is not measured: tables contain reflected light only")
+    if not measured.reciprocal:
+        return notes
     change = asymmetry(_Pass(Model(specimen.material, None), Detector(None, 0.0, 0.0, "all"), 0), EXCHANGED)
     if change < SAME:
-        return []
+        return notes
     return [
+        *notes,
         f"exchanging both directions changes f by {100.0 * change:.2g} % on average, but this table holds one value "
-        "for both: their least-squares mean is stored; .bsdf files and .gonio files with --table angles store each"
+        "for both: their least-squares mean is stored; .bsdf files and .gonio files with --table angles store each",
     ]
 
 
