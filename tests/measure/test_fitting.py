@@ -175,6 +175,14 @@ def test_values_are_fitted_at_their_own_directions(kind: str) -> None:
     assert (found.errors < 0.01 * right).all()
 
 
+def test_a_list_at_grazing_angles_is_one_clear_error() -> None:
+    degrees = np.column_stack([np.full(10, 85.0), np.arange(10.0), np.full(10, 30.0), np.zeros(10)])
+    listed = Samples(np.radians(degrees), np.full((10, 3), 0.1))
+    with pytest.raises(InputError, match="no valid value within that angle"):
+        fit(listed, "lambert")
+    assert fit(listed, "lambert", grazing=90.0).count == 10
+
+
 def test_a_value_and_its_swapped_one_are_of_one_run() -> None:
     theta, phi = np.radians([10.0, 33.0, 61.0]), np.radians([0.0, 40.0, 170.0])
     wo, wi = angles.pairs(theta, theta, phi)

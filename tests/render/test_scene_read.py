@@ -208,6 +208,8 @@ WRONG = [
     ("/scene/shapes/2/phi_max", 7, None, "full turn", "2pi"),
     ("/scene/shapes", {}, None, r"expected a list", r"\[ \]"),
     ("/scene/shapes/0", "sphere", None, "expected an object", "{ }"),
+    ("/output", "ball.exr", None, "expected an object", '{"filename": "ball.exr"}'),
+    ("/integrator", "path", None, "expected an object", '{"type": "path"}'),
     ("/scene/acceleration", "bhv", None, "expected 'embree'", "did you mean 'bvh'"),
     ("/scene/lights/0/energy", [-1, 0, 0], "/scene/lights/0/energy/0", "expected a number >= 0", ">= 0"),
     ("/scene/lights/0/energy", "5", None, "got the string '5'", "without quotes"),

@@ -126,6 +126,7 @@ def test_gain_and_loss_of_the_furnace() -> None:
     verdict = verify(OnePercentMore(), quick=True, law=["energy"])["energy"]
     assert verdict.bias is not None and verdict.bias.kind == "gained"
     assert verdict.bias.average == pytest.approx(0.01, rel=0.1) and verdict.grade in (Grade.SMALL, Grade.VISIBLE)
+    assert any(note.startswith("white furnace gains 0.0100 on average") for note in verdict.notes), verdict.notes
     lost = verify(RowAverage(), quick=True, law=["energy"])["energy"].bias
     assert lost is not None and lost.kind == "lost" and 0.02 < lost.average < 0.2
     grazing = verify(NoMasking(), quick=True, law=["energy"])["energy"].bias

@@ -11,7 +11,6 @@ model by which it is judged.
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,9 +22,9 @@ from ..catalog import notation, operands
 from ..errors import GonioError, InputError
 from ..material import BSDF, tree
 from ..material.parameters import ChoiceParameter
+from ..measure.formats import rows
 from .mistakes import f_of
 
-_COMMENT = re.compile(r"^\s*(?:#|//)\s*(model|up)\s*:\s*(.+?)\s*$", re.MULTILINE)
 _SAMPLING = "sampling"  # a choice that does not change f
 _EDGE = "edge"  # a parameter of `metal` that, unlike other numbers, changes the formula of F
 
@@ -57,7 +56,7 @@ class AnotherModelError(InputError):
 def comments(path: Path) -> dict[str, str]:
     """The "model" and "up" that the file's comments name, if any; empty for a file that cannot be read."""
     try:
-        return dict(_COMMENT.findall(path.read_text(encoding="utf-8-sig", errors="replace")))
+        return rows.comments(path.read_bytes())
     except OSError:
         return {}
 

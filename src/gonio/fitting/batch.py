@@ -75,8 +75,8 @@ def files_of(named: Sequence[str]) -> list[str]:
     for text in named:
         folder = Path(os.path.expanduser(text))
         if operands.kind_of(str(folder), {Kind.TABLE, Kind.FOLDER}, "DATA") is Kind.FOLDER:
-            inside = sorted(str(path) for path in folder.iterdir() if names_table(path.name) and path.is_file())
-            inside = [path for path in inside if not by_suffix(path)[0].common]
+            measured = (path for path in folder.iterdir() if names_table(path.name) and path.is_file())
+            inside = sorted(str(path) for path in measured if not by_suffix(path)[0].common)
             if not inside:
                 raise InputError("the folder contains no measurement file", text, "such as .binary, .bsdf or .gonio")
             paths += inside

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..measure.angles import half_difference_arrays
 from ..measure.tables.angles import Angles
 from ..measure.tables.base import Floats, Measurement, in_rgb
 from ..measure.tables.half_difference import HalfDifference, centres
@@ -156,9 +157,7 @@ def _inside(wo: Floats, wi: Floats, grazing: float) -> NDArray[np.bool_]:
 
 def _cell_of(wo: Floats, wi: Floats) -> NDArray[np.int64]:
     """Index of the cell in theta_h and theta_d of `GRID` that contains a pair, (N,)."""
-    h, d = wo + wi, wi - wo
-    theta_h = np.arctan2(np.hypot(h[:, 0], h[:, 1]), h[:, 2])
-    theta_d = np.arctan2(np.linalg.norm(d, axis=1), np.linalg.norm(h, axis=1))
+    theta_h, theta_d, _ = half_difference_arrays(wo, wi)
     i = np.minimum(np.sqrt(theta_h * (2.0 / np.pi)) * GRID[0], GRID[0] - 1)
     j = np.minimum(theta_d * (2.0 / np.pi) * GRID[1], GRID[1] - 1)
     return i.astype(np.int64) * GRID[1] + j.astype(np.int64)

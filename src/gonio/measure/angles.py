@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from .. import ops
-from ..ops import Direction, Scalar, dot, function, sqr, vec3, where
+import numpy as np
+from numpy.typing import NDArray
 
+from .. import ops
+from ..ops import Direction, Scalar, backend, dot, function, sqr, vec3, where
+
+Floats = NDArray[np.float64]
 HALF_PI = 0.5 * ops.pi
 
 
@@ -43,6 +47,17 @@ def half_difference(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scala
     theta_d = ops.atan2(ops.safe_sqrt(dot(d, d)), length)
     none = (along == 0.0) & (side == 0.0)
     return theta_h, theta_d, where(none, 0.0, ops.atan2(side, where(none, 1.0, along)))
+
+
+def half_difference_arrays(wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
+    """`half_difference` for NumPy arrays, (N, 3) each."""
+    if len(wo) == 0:  # Dr.Jit cannot broadcast empty arrays with arrays of one entry
+        return np.empty(0), np.empty(0), np.empty(0)
+    types = backend.types("float64")
+    angles = half_difference(*(backend.vector_of(w, 3, types) for w in (wo, wi)))
+    backend.drjit().eval(angles)
+    theta_h, theta_d, phi_d = (backend.to_numpy(angle, len(wo)) for angle in angles)
+    return theta_h, theta_d, phi_d
 
 
 @function

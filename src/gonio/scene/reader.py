@@ -197,6 +197,10 @@ ELSEWHERE = {
 }
 
 
+# objects for which a string can only be the value of one key
+KEY_OF_STRING = {"output": "filename", "integrator": "type"}
+
+
 def _type_of(file: str) -> str:
     """The type of a material or shape that a file holds, by its suffix."""
     from ..catalog import documents  # readers of files, not needed by scenes without such files
@@ -248,7 +252,9 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
         limit = next(context[name] for name in ("gt", "ge", "lt", "le") if name in context)
         what, hint = f"expected a number {sign} {limit:g}, got {value}", f"give a number {sign} {limit:g}"
     elif kind in ("model_type", "model_attributes_type", "dict_type", "dataclass_type"):
-        what, hint = f"expected an object {{...}}, got {got}", _as_object(value) or "put it in { }"
+        key = KEY_OF_STRING.get(str(steps[-1])) if steps and isinstance(value, str) else None
+        hint = f'write {{"{key}": "{value}"}}' if key else _as_object(value) or "put it in { }"
+        what = f"expected an object {{...}}, got {got}"
     elif kind == "list_type":
         what, hint = f"expected a list [...], got {got}", "put it in [ ]"
     elif kind == "bool_type":

@@ -135,9 +135,10 @@ def _cube_root_bar(axis: Axes, white: float) -> None:
 
 
 def _binned(capture: Capture, values: Floats) -> tuple[Floats, Floats]:
-    from ..instruments.capture.pixels import CELLS, half_difference
+    from ..instruments.capture.pixels import CELLS
+    from ..measure.angles import half_difference_arrays
 
-    theta_h, theta_d, _ = half_difference(*capture.samples.table.pairs())
+    theta_h, theta_d, _ = half_difference_arrays(*capture.samples.table.pairs())
     row = np.minimum((np.sqrt(theta_h / (0.5 * np.pi)) * CELLS[0]).astype(int), CELLS[0] - 1)
     column = np.minimum((theta_d / (0.5 * np.pi) * CELLS[1]).astype(int), CELLS[1] - 1)
     total, count = np.zeros((*CELLS[:2], 3)), np.zeros(CELLS[:2])

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...fitting.fit import NORMAL_95
+from ...measure.angles import half_difference_arrays
 from . import pixels
 from .fitting import Fitted
 from .pixels import Chosen, Scene
@@ -30,7 +31,7 @@ def _on_pictures(scene: Scene, chosen: Chosen) -> Iterator[str]:
     half, difference = [], []
     for part in chosen.parts:
         wo, wi, _ = pixels.directions(scene, part.kind, part.place, part.lamp)
-        theta_h, theta_d, _ = pixels.half_difference(wo, wi)
+        theta_h, theta_d, _ = half_difference_arrays(wo, wi)
         half.append(theta_h)
         difference.append(theta_d)
     nearest = float(np.degrees(np.percentile(np.concatenate(half), 0.1)))

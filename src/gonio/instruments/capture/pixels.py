@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from ...errors import InputError
+from ...measure.angles import half_difference_arrays
 from ...measure.tables.half_difference import pair_at
 from ...measure.tables.samples import Samples
 from ...ops import backend
@@ -320,23 +321,12 @@ class Gathered:
     def confidence(self) -> Floats:
         """Relative standard error of f over (sqrt(theta_h), theta_d); nan in cells without samples, where the table
         uses the nearest samples."""
-        theta_h, theta_d, _ = half_difference(*self.table.pairs())
+        theta_h, theta_d, _ = half_difference_arrays(*self.table.pairs())
         at = (_cell(np.sqrt(theta_h / (0.5 * np.pi)), CELLS[0]), _cell(theta_d / (0.5 * np.pi), CELLS[1]))
         inverse, spread = np.zeros(CELLS[:2]), np.full(CELLS[:2], np.nan)
         np.add.at(inverse, at, np.where(self.error > 0.0, 1.0 / np.maximum(self.error, 1e-6) ** 2, 0.0))
         spread[inverse > 0.0] = 1.0 / np.sqrt(inverse[inverse > 0.0])
         return spread
-
-
-def half_difference(wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
-    """theta_h, theta_d and phi_d, the last modulo pi by reciprocity (Rusinkiewicz1998)."""
-    from ...measure import angles
-
-    types = backend.types("float64")
-    coordinates = angles.half_difference(*(backend.vector_of(w, 3, types) for w in (wo, wi)))
-    backend.drjit().eval(coordinates)
-    theta_h, theta_d, phi_d = (backend.to_numpy(part, len(wo)) for part in coordinates)
-    return theta_h, theta_d, phi_d % np.pi
 
 
 def _cell(share: Floats, count: int) -> NDArray[np.int64]:
@@ -348,9 +338,10 @@ def gather(scene: Scene, chosen: Chosen, title: str) -> Gathered:
     angles, values = [], []
     for part in chosen.parts:
         wo, wi, square = directions(scene, part.kind, part.place, part.lamp)
-        angles.append(np.stack(half_difference(wo, wi), -1))
+        angles.append(np.stack(half_difference_arrays(wo, wi), -1))
         values.append(part.value * square[:, None] / scene.intensities[part.lamp] / wi[:, 2:])
     theta, value = np.concatenate(angles), np.concatenate(values)
+    theta[:, 2] %= np.pi  # by reciprocity
     share = np.stack([np.sqrt(theta[:, 0] / (0.5 * np.pi)), theta[:, 1] / (0.5 * np.pi), theta[:, 2] / np.pi], -1)
     index = np.ravel_multi_index(tuple(_cell(share[:, k], CELLS[k]) for k in range(3)), CELLS)
     _, which, count = np.unique(index, return_inverse=True, return_counts=True)

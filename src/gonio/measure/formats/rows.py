@@ -18,6 +18,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ...errors import InputError
+from ...optics.frame import spherical_array
 from ..tables.base import Floats, Measurement, in_rgb
 from ..tables.samples import Samples, sampled
 from . import text
@@ -112,8 +113,7 @@ def _is_number(word: str) -> bool:
 
 def _at(theta: Floats, phi: Floats) -> Floats:
     """Unit vectors at angles in degrees, (N, 3)."""
-    t, p = np.radians(theta), np.radians(phi)
-    return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+    return spherical_array(np.sin(np.radians(theta)), np.cos(np.radians(theta)), np.radians(phi))
 
 
 def _directions(w: Floats, name: str, lines: list[int], where: str) -> Floats:

@@ -13,6 +13,7 @@ from ... import ops
 from ...errors import InputError
 from ...material.angular_range import AngularRange, of_nodes
 from ...ops import Direction, Spectrum
+from ...optics.frame import spherical_array
 from .base import Floats, Measurement, finite, in_rgb
 from .guided import Guided
 from .half_difference import HalfDifference, centres
@@ -66,11 +67,10 @@ class Samples(Guided, Measurement):
     def pairs(self) -> tuple[Floats, Floats]:
         """wo and wi of every sample, (N, 3) each."""
         theta_i, phi_i, theta_r, phi_r = self.directions.T
-
-        def at(theta: Floats, phi: Floats) -> Floats:
-            return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-
-        return at(theta_r, phi_r), at(theta_i, phi_i)
+        wo, wi = (
+            spherical_array(np.sin(theta), np.cos(theta), phi) for theta, phi in ((theta_r, phi_r), (theta_i, phi_i))
+        )
+        return wo, wi
 
     @property
     def angular_range(self) -> AngularRange:
