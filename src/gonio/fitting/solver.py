@@ -71,8 +71,8 @@ def deviance(model: Array, value: Array, floor: Array) -> Array:
     which is large for a model of 0. For u >= 1 (data twice the model, more than noise explains), rho is log(1 + u) plus
     a constant: its derivative is bounded there, like Huber's (Huber1964), and it is bounded at u = -1 anyway. So no
     value has more influence than 1 / (f + c). For values below -c / 2, the derivative uses v + c, clamped to 0, and the
-    constant is that for -c / 2, since no model is negative. For values below -c, c is -v: an error of that size does not
-    tell a model of 0 from a smaller one than |v|.
+    constant is that for -c / 2, since no model is negative. For values below -c, c is -v: with an error of that size,
+    a model of 0 cannot be told from one below |v|.
     """
     dr = backend.drjit()
     size = _size(model)
