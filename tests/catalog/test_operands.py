@@ -96,6 +96,8 @@ def test_what_is_there_goes_before_what_is_a_name_alone(here: Path) -> None:
         ("scene", MATERIALS, ["'scene' is a scene, a material expected", "render, study and view"]),
         ("a.exr", {Kind.SCENE, *MATERIALS}, ["'a.exr' is a picture, a material or a scene expected", "compare"]),
         ("tables", {Kind.SCENE}, ["baked tables, a scene expected", "info and plot"]),
+        ("ggx(alpha=0.3)", MATERIALS, ["is a distribution of normals", "as a material: conductor(ndf=ggx)"]),
+        ("ggx", {Kind.SCENE}, ["is a distribution of normals, a scene expected", "bake takes distributions"]),
         ("nowhere/a", MATERIALS, ["no file or folder 'nowhere/a'", "check the path"]),
         ("broken.json", MATERIALS, ["not valid JSON: ", "broken.json"]),
         ("sub/mine.py", MATERIALS, ["names a file, but no class in it", "sub/mine.py:CLASS"]),

@@ -75,6 +75,8 @@ def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str
         return kind
     shown = _shortened(text)
     what, hint = f"'{shown}' is {kinds[0].value}, {_expected(accepted)} expected", _TAKEN.get(kinds[0], "")
+    if kinds[0] is Kind.DISTRIBUTION and Kind.NAME in accepted:
+        hint = f"as a material: conductor(ndf={texts.split(text)[0]})"
     if Kind.SCENE in kinds and (reason := _broken(Path(text))):
         what, where, hint = reason, text, "correct the file"
     elif not _exists(Path(text)) and kinds[0] not in (Kind.NAME, Kind.CODE, Kind.PLUGIN, Kind.DISTRIBUTION):
