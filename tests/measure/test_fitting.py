@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import gonio as go
@@ -216,9 +217,39 @@ def test_an_index_leaves_the_end_of_its_range_where_its_slope_is_0(seed: int) ->
     np.testing.assert_allclose(index, eta, atol=0.15)
 
 
+def test_arrays_of_pairs_can_be_fitted() -> None:
+    listed = _listed(PLASTIC, 0.02, 3)
+    wo, wi = listed.pairs()
+    expected = fit(listed, "lambert+ggx").values
+    np.testing.assert_allclose(fit((wo, wi, listed.values), "lambert+ggx").values, expected, rtol=1e-6)
+    gray = fit((wo.tolist(), wi.astype(np.float32), listed.values[:, 0]), "lambert").values
+    np.testing.assert_array_equal(gray, gray[0])
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda wo, wi, f: (2.0 * wo, wi, f), r"wo\[0\] is .* a unit vector expected"),
+        (lambda wo, wi, f: (wo, -wi, f), r"wi\[\d+\] is below the surface"),
+        (lambda wo, wi, f: (wo, wi, f[:9]), r"f \(9, 3\), \(N, 3\)"),
+        (lambda wo, wi, f: (wo, wi, f[:, :2]), "fit: data: 2 channels without wavelengths"),
+        (lambda wo, wi, f: (wo, wi, np.where(f > 0.1, np.nan, f)), "values of f are not finite"),
+        (lambda wo, wi, f: (wo, wi, np.ma.masked_greater(f, 0.1)), "f has masked values"),
+        (lambda wo, wi, f: (wo, wi, "a"), "f is not an array of numbers"),
+        (lambda wo, wi, f: (wo[0], wi[0], f[0]), r"wo \(3,\)"),
+        (lambda wo, wi, f: (wo, wi, 0.5), r"f \(\)"),
+        (lambda wo, wi, f: (wo, wi), "three arrays expected"),
+    ],
+)
+def test_arrays_that_are_no_pairs_are_one_clear_error(damage: Callable[..., object], message: str) -> None:
+    listed = _listed(PLASTIC, 0.02, 3)
+    with pytest.raises(InputError, match=message):
+        fit(damage(*listed.pairs(), listed.values), "lambert")
+
+
 def test_a_measured_material_can_be_fitted() -> None:
     assert fit(go.Measured(), "lambert").names == ("albedo.r", "albedo.g", "albedo.b")
-    with pytest.raises(InputError, match="list given, a file of measured values or a table expected"):
+    with pytest.raises(InputError, match="list given, a file of measured values, a table or three arrays expected"):
         fit([0.1, 0.2], "lambert")
 
 

@@ -77,7 +77,7 @@ def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Da
     if isinstance(table, HalfDifference):
         data = _of_cells(table, grazing)
     elif isinstance(table, (Samples, Angles)):
-        data = _of_pairs(table, grazing)
+        data = _of_pairs(table, grazing, where)
     else:
         data = _resampled(table, grazing)
     if not len(data):
@@ -106,14 +106,15 @@ def _of_cells(table: HalfDifference, grazing: float) -> Data:
     return data if valid.all() else data.known(valid[inside])
 
 
-def _of_pairs(table: Samples | Angles, grazing: float) -> Data:
+def _of_pairs(table: Samples | Angles, grazing: float, where: str) -> Data:
     """The values of a table that stores them for pairs of directions. A run of neighbors has about the same theta_h and
     theta_d, as in a half-difference table. It includes the swapped pair and the mirror image of each pair, which have
     the same value in a reciprocal table."""
     wo, wi = table.pairs()
     inside = _inside(wo, wi, grazing)
     wo, wi = wo[inside], wi[inside]
-    value = in_rgb(table.values.reshape(-1, table.values.shape[-1])[inside], table.wavelengths) * wi[:, 2:]
+    f = table.values.reshape(-1, table.values.shape[-1])[inside]
+    value = in_rgb(f, table.wavelengths, where) * wi[:, 2:]
     _, row = np.unique(_cell_of(wo, wi), return_inverse=True)
     return Data(wo, wi, value, row, {"grazing": len(inside) - len(wo)})
 

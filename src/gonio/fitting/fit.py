@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import renamed
 from ..catalog import notation
@@ -22,6 +22,7 @@ from ..material import BSDF
 from ..materials.measured.measured import Measured
 from ..measure import read
 from ..measure.tables.base import Floats, Measurement
+from ..measure.tables.samples import Samples
 from ..owner import public
 from .certainty import certainty, connected, degrees_of_freedom, information
 from .data import GRAZING, Data, data_of
@@ -43,6 +44,8 @@ NORMAL_95 = 1.96
 MANY = 1e6  # degrees of freedom above which the distribution counts as normal
 COLUMNS = ("value", "error", "low", "high")  # columns of a fit as a table
 TIED = 0.98  # correlation above which two parameters are reported
+
+Pairs = tuple[ArrayLike, ArrayLike, ArrayLike]  # wo, wi, f
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,7 @@ def quantiles(degrees: Floats | None) -> Floats:
 @renamed(metric="loss", fixed="param")
 @public
 def fit(
-    data: str | os.PathLike[str] | Measurement | Measured | Data,
+    data: str | os.PathLike[str] | Measurement | Measured | Data | Pairs,
     model: MaterialLike = "conductor",
     *,
     lobes: int = 1,
@@ -192,7 +195,8 @@ def fit(
         result = go.fit("gold.binary", "lambert+ggx")
         result.material, result.values, result.errors
 
-    data      a measurement file, a table, a `go.Measured`, or `Data`
+    data      a measurement file, a table, a `go.Measured`, `Data`, or three arrays (wo, wi, f): unit vectors (N, 3)
+              above the surface, z up, and the BRDF (N,) or (N, 3) in 1/sr without the cosine
     model     anything that `go.material` takes, such as the sum "lambert+ggx"; the fit starts from its parameter values
     lobes     number of copies of the last term of the sum
     loss      "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
@@ -208,7 +212,8 @@ def fit(
     if loss not in METRICS:
         raise InputError(f"unknown metric '{loss}'", "loss", " | ".join(METRICS))
     material, moving, notes = moving_with_notes(model, lobes, param, free)
-    cells = data if isinstance(data, Data) else data_of(_table_of(data), grazing)
+    where = os.fspath(data) if isinstance(data, (str, os.PathLike)) else "fit: data"
+    cells = data if isinstance(data, Data) else data_of(_table_of(data), grazing, where)
     middle = Problem(material, moving, cells.some(SOME), loss)
     best = _best(middle, starts_of(material, moving), progress)
     full = middle
@@ -227,8 +232,10 @@ def _table_of(data: object) -> Measurement:
         return data.table
     if isinstance(data, (str, os.PathLike)):
         return read(data)
-    what = f"{type(data).__name__} given, a file of measured values or a table expected"
-    raise InputError(what, "fit: data", 'such as go.fit("gold.binary") or go.fit(go.Measured("gold.binary"))')
+    if isinstance(data, (tuple, list)) and len(data) == 3:
+        return Samples.of_pairs(*data, where="fit: data")
+    what = f"{type(data).__name__} given, a file of measured values, a table or three arrays expected"
+    raise InputError(what, "fit: data", 'such as go.fit("gold.binary") or go.fit((wo, wi, f))')
 
 
 def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:

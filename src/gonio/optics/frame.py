@@ -48,6 +48,11 @@ def spherical_array(sin_theta: ArrayLike, cos_theta: ArrayLike, phi: ArrayLike) 
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
+def angles_of_array(w: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """theta in [0, pi] and phi in (-pi, pi] of directions (..., 3), each (...); accurate near the normal."""
+    return np.arctan2(np.hypot(w[..., 0], w[..., 1]), w[..., 2]), np.arctan2(w[..., 1], w[..., 0])
+
+
 def normal_like(like: Direction) -> Direction:
     """The surface normal (0, 0, 1), repeated for every ray of `like`."""
     zero = ops.zeros_like(like.z)

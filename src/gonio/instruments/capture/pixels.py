@@ -356,13 +356,5 @@ def gather(scene: Scene, chosen: Chosen, title: str) -> Gathered:
         error = np.sqrt(scatter.mean(axis=1) / np.maximum(count - 1, 1)) / size
     wo, wi = pair_at(middle[:, 0] ** 2 * 0.5 * np.pi, middle[:, 1] * 0.5 * np.pi, middle[:, 2] * np.pi)
     above = (wo[:, 2] > 0.0) & (wi[:, 2] > 0.0)
-    table = Samples(_angles(wi[above], wo[above]), level[above], title=title, source={"format": "photographs"})
+    table = Samples.of_pairs(wo[above], wi[above], level[above], title=title, source={"format": "photographs"})
     return Gathered(table, np.where(count > 1, error, np.nan)[above], count[above])
-
-
-def _angles(wi: Floats, wo: Floats) -> Floats:
-    """theta_i, phi_i, theta_r, phi_r of pairs, (N, 4)."""
-    columns = []
-    for w in (wi, wo):
-        columns += [np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]), np.arctan2(w[:, 1], w[:, 0])]
-    return np.stack(columns, -1)

@@ -20,6 +20,7 @@ from ...bridge import engine
 from ...catalog.notation import written
 from ...errors import InputError
 from ...material import BSDF
+from ...optics.frame import angles_of_array
 from ..surfaces.base import Surface
 from . import rays
 from .specimen import GROUPS, Floats, Specimen, half_angle
@@ -164,7 +165,7 @@ class Rough(Specimen):
         maps = group[0] + group[1] if maps is None else maps
         places, weights = self._places(wo, wi)
         solid = np.sum([weight * self._solid[place] for place, weight in zip(places, weights, strict=True)], axis=0)
-        at = np.interp(np.arctan2(np.hypot(wi[:, 0], wi[:, 1]), wi[:, 2]), self.lights, np.arange(len(self.lights)))
+        at = np.interp(angles_of_array(wi)[0], self.lights, np.arange(len(self.lights)))
         low = np.minimum(at.astype(np.int64), max(len(self.lights) - 2, 0))
         rest = (at - low)[:, None]
         total = np.zeros((len(wo), 3))

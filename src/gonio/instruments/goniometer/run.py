@@ -21,6 +21,7 @@ from ...material import BSDF, is_model
 from ...measure import colours
 from ...measure.compare import asymmetry
 from ...measure.tables.base import Measurement
+from ...optics.frame import angles_of_array
 from ...owner import public
 from ..surfaces import base as surfaces
 from ..surfaces.base import Surface
@@ -153,7 +154,7 @@ class _Scout(Measurement):
         self.theta_i: list[Floats] = []
 
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
-        self.theta_i.append(np.unique(np.round(np.arctan2(np.hypot(wi[:, 0], wi[:, 1]), wi[:, 2]), 9)))
+        self.theta_i.append(np.unique(np.round(angles_of_array(wi)[0], 9)))
         return np.repeat(wi[:, 2:], 3, 1)
 
 

@@ -145,9 +145,8 @@ class Rows(Format):
             line = pairs.line[int(np.argmin(lowest))]
             what = "a direction below the surface"
             raise InputError(what, f"{where}:{line}", "give reflected light only; another axis is up: '# up: y'")
-        angles = [angle for w in (pairs.wi, pairs.wo) for angle in _spherical(w)]
         source = {"format": self.name, **{key: value for key, value in about.items() if key not in ("up", "title")}}
-        return Samples(np.stack(angles, -1), pairs.f, where, about.get("title", ""), source)
+        return Samples.of_pairs(pairs.wo, pairs.wi, pairs.f, where, about.get("title", ""), source)
 
     def write(self, table: Measurement) -> bytes:
         assert isinstance(table, Samples), "ensured by `resampled`"
@@ -166,8 +165,3 @@ class Rows(Format):
             return source
         rgb = in_rgb(source.values, source.wavelengths)
         return Samples(source.directions, rgb, title=source.title, source=source.source)
-
-
-def _spherical(w: Floats) -> tuple[Floats, Floats]:
-    """theta and phi of unit vectors above the surface, rad."""
-    return np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]), np.arctan2(w[:, 1], w[:, 0])

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ... import ops
 from ...errors import InputError
@@ -204,10 +204,15 @@ def axis(values: NDArray[np.generic], name: str, where: str, low: float, high: f
     return nodes
 
 
-def finite(values: NDArray[np.generic], name: str, where: str) -> Floats:
-    """Values as float64. Raises InputError, which names `where` and `name`, if one is not finite."""
-    array = np.asarray(values, np.float64)
+def finite(values: ArrayLike, name: str, where: str, hint: str = "the file is damaged") -> Floats:
+    """Values as float64. Raises InputError, which names `where` and `name`, unless they are finite numbers."""
+    try:
+        array = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is not an array of numbers", where, hint) from None
+    if np.ma.is_masked(values):
+        raise InputError(f"{name} has masked values", where, "give only the unmasked rows")
     bad = int(np.size(array) - np.count_nonzero(np.isfinite(array)))
     if bad:
-        raise InputError(f"{bad} of {array.size} values of {name} are not finite", where, "the file is damaged")
+        raise InputError(f"{bad} of {array.size} values of {name} are not finite", where, hint)
     return array

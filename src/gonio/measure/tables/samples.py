@@ -7,13 +7,13 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ... import ops
 from ...errors import InputError
 from ...material.angular_range import AngularRange, of_nodes
 from ...ops import Direction, Spectrum
-from ...optics.frame import spherical_array
+from ...optics.frame import angles_of_array, spherical_array
 from .base import Floats, Measurement, finite, in_rgb
 from .guided import Guided
 from .half_difference import HalfDifference, centres
@@ -22,6 +22,7 @@ CELLS = (45, 30, 30)  # of the table that interpolates the samples
 NEIGHBORS = 24  # samples from which a cell is interpolated
 DARK = 1e-3  # fraction of the median value: separates absolute from relative differences
 AROUND = np.radians(10.0)  # smallest measured angle below which the normal lies among measured directions
+UNIT = 1e-3  # largest deviation of a direction's length from 1
 SAME = 1e-6  # distance of features below which samples are repeated measurements
 
 
@@ -63,6 +64,40 @@ class Samples(Guided, Measurement):
             raise InputError(what, where, "reflection is above the surface; are the angles in radians?")
         if wavelengths is not None and len(wavelengths) != self.values.shape[1]:
             raise InputError(f"{self.values.shape[1]} values per sample for {len(wavelengths)} wavelengths", where)
+
+    @classmethod
+    def of_pairs(
+        cls,
+        wo: ArrayLike,
+        wi: ArrayLike,
+        f: ArrayLike,
+        where: str = "",
+        title: str = "",
+        source: Mapping[str, str] | None = None,
+    ) -> Samples:
+        """Samples of pairs of directions.
+
+        wo, wi  (N, 3), unit vectors above the surface, z up
+        f       (N,) or (N, channel), the BRDF in 1/sr without the cosine
+        Raises InputError for other shapes, directions below the surface, and vectors that are not normalized.
+        """
+        hint = "give finite numbers"
+        o, i, values = (finite(array, name, where, hint) for array, name in ((wo, "wo"), (wi, "wi"), (f, "f")))
+        values = values[:, None] if values.ndim == 1 else values
+        if o.ndim != 2 or o.shape[1] != 3 or i.shape != o.shape or values.shape[:1] != o.shape[:1]:
+            what = f"wo {o.shape}, wi {i.shape} and f {values.shape}"
+            raise InputError(f"{what}, (N, 3), (N, 3) and (N, channel) expected", where)
+        for name, w in (("wo", o), ("wi", i)):
+            off = np.abs(np.linalg.norm(w, axis=1) - 1.0)
+            if off.max(initial=0.0) > UNIT:
+                row = int(np.argmax(off))
+                raise InputError(
+                    f"{name}[{row}] is {w[row]}, a unit vector expected", where, "normalize the directions"
+                )
+            if w[:, 2].min(initial=1.0) <= 0.0:
+                what = f"{name}[{int(np.argmin(w[:, 2]))}] is below the surface"
+                raise InputError(what, where, "give reflected light only, with the normal along z")
+        return cls(np.stack([*angles_of_array(i), *angles_of_array(o)], -1), values, where, title, source)
 
     def pairs(self) -> tuple[Floats, Floats]:
         """wo and wi of every sample, (N, 3) each."""
