@@ -233,7 +233,8 @@ def _table_of(data: object) -> Measurement:
     if isinstance(data, (str, os.PathLike)):
         return read(data)
     if isinstance(data, (tuple, list)) and len(data) == 3:
-        return Samples.of_pairs(*data, where="fit: data")
+        wo, wi, f = data
+        return Samples.of_pairs(wo, wi, f, "fit: data")
     what = f"{type(data).__name__} given, a file of measured values, a table or three arrays expected"
     raise InputError(what, "fit: data", 'such as go.fit("gold.binary") or go.fit((wo, wi, f))')
 
