@@ -177,10 +177,10 @@ and `film_eta` is its index.
 ![Above, titanium with an oxide film of index 2.3; below, soap films of index 1.33](images/films.jpg)
 
 At a single wavelength, the sum of all waves that the two interfaces of the film reflect is
-r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)). Here r12 and r23 are the amplitudes that the outer and the
-inner interface reflect, and delta is the phase that a wave gains on its way through the film and back. The sum agrees
-with the characteristic matrix of a layer to 1e-12 (`tests/optics/test_film.py`). Spectral variants evaluate this
-amplitude per wavelength. In RGB, the parameter `form` selects how the three color channels are derived from it:
+r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)). Here r12 and r23 are the amplitude reflection coefficients of
+the outer and the inner interface, and delta is the phase that a wave gains on its way through the film and back. The
+sum agrees with the characteristic matrix of a layer to 1e-12 (`tests/optics/test_film.py`). Spectral variants evaluate
+this amplitude per wavelength. In RGB, the parameter `form` selects how the three color channels are derived from it:
 
 - `local` (default) is the locally spectral form that the authors of OpenPBR proposed (issue 246, pull request 262 of
   its repository). The reflectance at 20 wavelengths is converted to a color under D65 for the CIE 1931 observer. The
@@ -194,11 +194,11 @@ three-channel color of a `conductor`. `belcour-barla` reproduces the color of th
 
 ## Accuracy
 
-The reference is the exact reflectance of film and metal, computed by the package `tmm` with transfer matrices: at 81
-wavelengths with the metal's measured index, under D65, for films of 50 to 2,000 nm with indices of 1.38 and 2.0. Both
-forms use the metal's index at three wavelengths only. The tables give color differences from the reference in CIE
-Delta E 2000 (Sharma2005): a difference of 1 is just noticeable side by side, one of 5 is a different shade, and one
-of 10 is a different color.
+The reference is the exact reflectance of the film on the metal, computed by the package `tmm` with transfer matrices at
+81 wavelengths, with the metal's measured index, under D65. The films are 50 to 2,000 nm thick and have indices of 1.38
+and 2.0. Both forms use the metal's index at three wavelengths only. The tables give color differences from the
+reference in CIE Delta E 2000 (Sharma2005): a difference of 1 is just noticeable side by side, one of 5 is a different
+shade, and one of 10 is a different color.
 
 {metals}
 
