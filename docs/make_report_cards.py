@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
+import re
 import shutil
 import sys
 import time
@@ -57,26 +58,27 @@ UPSTREAM = {
 }
 
 EXPLANATION = """
-- *pass*: the law holds within its tolerance, at the given values and at those listed on the page. *declared*: the
-  model declares that it violates the law, and by how much. **fails**, with the grade: *invisible* (under 0.1 % of the
+- *pass*: the law holds within its tolerance, at the given values and at those listed on the page; *declared*: the
+  model declares that it violates the law, and by how much; **fails**, with the grade: *invisible* (under 0.1 % of the
   reflected light on average and under 1 % at worst), *small* (1 %, 10 %), *visible* (10 %, 50 %), *broken*; *NaN*;
   *noise* (wastes samples without bias); *interface* (calls that plain path tracers do not make); *inner* (a material
   inside it fails; with a correct one the law holds); *by nature* (the law does not apply to this kind of plugin).
 - *-*: the law does not apply; the page gives the reason. Mitsuba's plugins are float32, with wider tolerances, and have
   no 64-bit variant for `gradients` and `precision`.
 - A sample of weight 0 counts as failed, as in Mitsuba's own chi-square test.
-- Composed BSDFs are judged with simple ones inside: blendbsdf = diffuse + roughconductor, mask, bumpmap and normalmap
+- Composed BSDFs are tested with simple ones inside: blendbsdf = diffuse + roughconductor, mask, bumpmap and normalmap
   over diffuse, twosided over roughconductor. bumpmap is a uniform slope: a tilted normal is by nature neither
   isotropic nor reciprocal about the geometric one. hair is defined about a fiber, not about a surface normal.
-- Mitsuba's microfacet plugins use Beckmann's distribution by default; GGX is judged too.
+- Mitsuba's microfacet plugins use Beckmann's distribution by default; GGX is tested too.
 """
 
 BLIND = """
-## Limitations
+## What this report does not cover
 
-The laws are judged at one point of a surface (uv = 0.5, 0.5) without textures, for unpolarized light in three channels,
-and only at the parameter values above. They do not detect errors below the tolerances or errors of integrators, and
-they do not test whether the formula is correct for the material: they hold for many wrong formulas.
+The tests cover one point of an untextured surface (uv = 0.5, 0.5), unpolarized light in three channels, and only the
+parameter values listed. Violations below the tolerances are not detected. The tests cover neither integrators, nor
+interreflection between surfaces, nor whether the formula is correct for the material: many wrong formulas obey the
+laws.
 """
 
 
@@ -157,9 +159,10 @@ def page(target: str, report: Report) -> str:
     lines = [
         f"# {target}",
         "",
-        f"`gonio verify`, {made}Gonio {go.__version__}, {datetime.date.today()}, effort {report.effort}, seed "
-        f"{report.seed}; {report.tests} statistical tests at {report.threshold:.1e} each (0.01 over all, Sidak), "
-        "rejections confirmed with a second seed.",
+        f"These are the results of `gonio verify` ({made}Gonio {go.__version__}, {datetime.date.today()}, effort "
+        f"{report.effort}, seed {report.seed}), with {report.tests} statistical tests at significance "
+        f"{report.threshold:.1e} each (0.01 overall, Sidak correction). A rejection counts only if a second seed "
+        "confirms it.",
     ]
     for card in report.cards:
         lines += ["", f"## {card.title}", "", "| law | verdict | figure | allowed | remark |", "|---|---|---|---|---|"]
@@ -183,11 +186,23 @@ def page(target: str, report: Report) -> str:
 def _remark(v: Verdict) -> str:
     if v.status == NOT_APPLICABLE:
         return _clean("; ".join(v.why))
-    return _clean("; ".join([*v.notes, v.worst] if v.notes or v.worst else []))
+    return _clean("; ".join(filter(None, [*v.notes, v.worst])))
+
+
+def _number(text: str) -> str:
+    """The number in a description of a sampling quality: "0.35 %", "2.9"; "" if there is none."""
+    return "".join(re.findall(r"[0-9.]+(?: %)?", text)[:1])
 
 
 def _clean(text: str) -> str:
     return text.replace("|", "/").replace(str(Path.cwd()), ".")
+
+
+def _untested(target: str, reason: str) -> str:
+    """The text of a page for a target that cannot be created."""
+    *_, message = reason.rpartition("Mitsuba rejects it: ")
+    why = f"`{target}` was not tested, because it cannot be created without parameters."
+    return f"{why} The error message is: {message}"
 
 
 def main() -> int:
@@ -212,7 +227,7 @@ def main() -> int:
         except go.GonioError as error:
             reason = " ".join(str(error).split())
             results[target] = {"not judged": reason}
-            (FOLDER / f"{name}.md").write_text(f"# {target}\n\nNot judged: {reason}\n")
+            (FOLDER / f"{name}.md").write_text(f"# {target}\n\n{_untested(target, reason)}\n")
             continue
         (FOLDER / f"{name}.md").write_text(page(target, report))
         results[target] = {
@@ -238,15 +253,15 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
         "# Report cards",
         "",
         f"These are the results of `gonio verify` for {renderers}, effort {effort}, seed {seed}.",
-        "The page is generated by `python docs/make_report_cards.py`; a cell is the worst over all settings of a page.",
-        "The shaders of engines have [cards of their own](engines/README.md).",
+        "The page is generated by `python docs/make_report_cards.py`. A cell gives the worst verdict over all settings",
+        "of a target. The shaders of engines have [cards of their own](engines/README.md).",
         "",
         *EXPLANATION.strip().splitlines(),
         "",
-        "## Failures, the worst first",
+        "## Failures, worst first",
         "",
-        "Percentages refer to the reflected light. A program needs only Mitsuba, and ends with an AssertionError that",
-        "states the figure as long as the fault exists.",
+        "Percentages refer to the reflected light. A program needs only Mitsuba; while the fault exists, it ends with",
+        "an AssertionError that states the measured value.",
         "",
         "| grade | BSDF | law | effect | probable cause | known upstream | program |",
         "|---|---|---|---|---|---|---|",
@@ -267,27 +282,27 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
     for target, result in ordered:
         link = f"[{target}]({target.replace(':', '-')}.md)"
         if "not judged" in result:
-            reason = result["not judged"].split(": ", 1)[-1][-70:]
-            lines.append(f"| {link} | not judged: {reason} |" + " |" * (len(SHORT) - 1))
+            lines.append(f"| {link} | not tested |" + " |" * (len(SHORT) - 1))
         else:
             lines.append(f"| {link} | " + " | ".join(result["laws"][law] for law in SHORT) + " |")
     lines += [
         "",
         "## Sampling quality",
         "",
-        "These are figures, not verdicts: materials that satisfy all laws may differ here. All are means over the",
-        "hemisphere of wo.",
+        "These values are not verdicts: materials that obey all laws may differ here. All are means over the",
+        "hemisphere of wo. The last two columns give the efficiency relative to cosine sampling and to sampling",
+        "without variance.",
         "",
-        "| target, setting | samples that fail | variance of the weight | against cosine sampling | of the ideal |",
+        "| target, setting | failed samples | variance of the weight | relative to cosine sampling | of the ideal |",
         "|---|---|---|---|---|",
     ]
     for _, result in ordered:
         for setting, texts in result.get("quality", {}).items():
             if texts:
-                lines.append(f"| {setting} | {' | '.join(text.split('fail')[0].strip() for text in texts)} |")
+                lines.append(f"| {setting} | {' | '.join(map(_number, texts))} |")
     lines += [
         "",
-        "## Loss of the white furnace",
+        "## Loss in a white furnace",
         "",
         "Every albedo is 1 and, if it can be chosen, F = 1. The table gives the average loss over a hemisphere and the",
         "largest loss; a negative loss is a gain.",

@@ -186,9 +186,9 @@ def _laws(found: manual.Page) -> str:
     lines = [f"Violates the law **{law}** by design: {escaped(reason)}." for law, reason in found.breaks.items()]
     card = ROOT / f"docs/report-cards/{found.name}.md"
     if card.exists():
-        lines.append(f"Judged in full on its [report card](../../report-cards/{found.name}.md).")
+        lines.append(f"All test results are on its [report card](../../report-cards/{found.name}.md).")
     else:
-        lines.append(f"`gonio verify {found.name} -o card` judges it and writes its report card.")
+        lines.append(f"`gonio verify {found.name} -o card` tests it and writes its report card.")
     return "\n\n".join(lines)
 
 

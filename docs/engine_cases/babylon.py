@@ -9,11 +9,12 @@ from gonio.catalog.shaders import files
 
 from .base import Engine, Furnace, asymmetry, furnace, material, single_scattering
 
-INTRO = """PBRMaterial of the WebGL engine under directional lights: the package's own fragment program,
-`Shaders/pbr.fragment.js`, for a flat surface without maps, with the defines that the class sets. `babylon-standard`
-has the defaults of `new PBRMaterial`; `babylon-conserving` has `brdf.useLegacySpecularEnergyConservation = false`.
-Light from an environment map takes another path and is not judged here. White metal is within 1% of 1 at all
-roughnesses and angles: the best of the engines judged here."""
+INTRO = """This card tests PBRMaterial of the WebGL engine under directional lights. It runs the package's own fragment
+program, `Shaders/pbr.fragment.js`, for a flat surface without texture maps, with the defines that the class sets.
+`babylon-standard` has the defaults of `new PBRMaterial`; `babylon-conserving` has
+`brdf.useLegacySpecularEnergyConservation = false`. Light from an environment map follows a different code path and is
+not tested here. The albedo of white metal is within 1% of 1 at all roughnesses and angles, which is the best result of
+the engines tested here."""
 
 _LOW = 0.1  # cosine of view and light for the diffuse lobe at grazing angles
 
@@ -115,75 +116,93 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     last = list(figures.values())[-1]
     return f"""## The diffuse lobe is reduced by F at n.h
 
-Without legacy conservation `lightFragment` multiplies `info.diffuse` by 1 minus `fresnelSchlickGGX(NdotH, ...)`, where
-the specular lobe takes F at `preInfo.VdotH`. The angle of incidence on a facet is that between v and h. With n.h the
-formula (1 - F) / pi gives the shader's diffuse lobe within {last["own_off"]:.0e} for 2,000 random pairs, with v.h they
-differ by up to {last["meant_off"]:.2f}. White paper seen at n.v 0.1, in units of a white Lambertian surface:
+Without legacy conservation, `lightFragment` multiplies `info.diffuse` by 1 minus `fresnelSchlickGGX(NdotH, ...)`,
+whereas the specular lobe uses F at `preInfo.VdotH`. The angle of incidence on a facet is the angle between v and h.
+With n.h, the formula (1 - F) / pi gives the shader's diffuse lobe within {last["own_off"]:.0e} for 2,000 random pairs;
+with v.h, the two differ by up to {last["meant_off"]:.2f}. The table gives the diffuse lobe of a white dielectric seen
+at n.v 0.1, in units of a white Lambertian surface:
 
-| lamp at n.l 0.1 | F at n.h, as it is | F at v.h |
+| light at n.l 0.1 | F at n.h (as implemented) | F at v.h |
 |---|---|---|
-| beside the viewer | {last["beside"]:.3f} | {last["beside_meant"]:.3f} |
-| opposite, where gloss is strongest | {last["opposite"]:.3f} | {last["opposite_meant"]:.3f} |
+| on the viewer's side | {last["beside"]:.3f} | {last["beside_meant"]:.3f} |
+| opposite the viewer, where the specular lobe is strongest | {last["opposite"]:.3f} | {last["opposite_meant"]:.3f} |
 
-The diffuse lobe keeps most where gloss takes most. Remedy: `preInfo.VdotH` in place of `NdotH`, in `lightFragment`,
-`pbrClusteredLightingFunctions` and `openpbrDirectLighting`, also in the WGSL chunks of the same names; or 1 minus the
-albedo of the specular lobe at n.v, as `pbrBlockFinalLitComponents` does for `finalIrradiance`.
+The diffuse lobe is reduced least where the specular lobe reflects most. Remedy: use `preInfo.VdotH` instead of `NdotH`
+in `lightFragment`, `pbrClusteredLightingFunctions` and `openpbrDirectLighting`, and in the WGSL chunks of the same
+names; or multiply by 1 minus the albedo of the specular lobe at n.v, as `pbrBlockFinalLitComponents` does for
+`finalIrradiance`.
 
 ## The clear coat is compensated with the F0 of its base
 
-`clearcoatBlock` passes `outParams.specularEnvironmentR0` to `getEnergyConservationFactor`: 1 + F0 (1 / E - 1) with the
-F0 of the base, while the coat reflects 0.04 at normal incidence. A coat of roughness 1 over white metal is
-{last["coat_ratio"]:.2f} times as bright as the same coat over black, away from the highlight of the base; 1 / E is
-{last["coat_factor"]:.2f}, and the factor for F0 = 0.04 is {last["coat_meant"]:.2f} over any base.
-Remedy: `vec3(vClearCoatRefractionParams.x)` in place of `outParams.specularEnvironmentR0`."""
+`clearcoatBlock` passes `outParams.specularEnvironmentR0` to `getEnergyConservationFactor`. The factor is therefore
+1 + F0 (1 / E - 1) with the F0 of the base, whereas the coat reflects 0.04 at normal incidence. Away from the highlight
+of the base, a coat of roughness 1 over white metal is {last["coat_ratio"]:.2f} times as bright as the same coat over
+black metal; 1 / E is {last["coat_factor"]:.2f}, and the factor for F0 = 0.04 is {last["coat_meant"]:.2f} over any base.
+Remedy: pass `vec3(vClearCoatRefractionParams.x)` instead of `outParams.specularEnvironmentR0`."""
 
 
 CAUSES = {
     (
         "babylon-standard",
         "reciprocity",
-    ): "`getEnergyConservationFactor` depends on n.v alone, which gives up reciprocity "
-    "for energy. Without it (E = 1 in the table) f(wo, wi) and f(wi, wo) differ by {none_asymmetry:.0e} instead of "
-    "{asymmetry:.2f}. It matters to path tracers, not to a rasterizer.",
+    ): "`getEnergyConservationFactor` depends only on n.v, which trades reciprocity for energy conservation. Without "
+    "it (E = 1 in the table), f(wo, wi) and f(wi, wo) differ by {none_asymmetry:.0e} instead of {asymmetry:.2f}. This "
+    "matters for path tracers, not for a rasterizer.",
     (
         "babylon-standard",
         "energy",
-    ): "E in the table, which is stored with 8 bits and a common divisor, is wrong by up to "
-    "{table:.1%} at roughness 0.25 and more. The size is invisible.",
+    ): "E in the table, which is stored with 8 bits and a common divisor, has errors of up to "
+    "{table:.1%} at roughness 0.25 and above. An error of this size is invisible.",
     (
         "babylon-standard",
         "precision",
     ): "`normalDistributionFunction_TrowbridgeReitzGGX` computes `NdotH^2 (a2 - 1) + 1`, "
-    "the difference of two numbers near 1 at the center of the lobe. `MINIMUMVARIANCE` of 0.0005 lets a2 fall to "
-    "2.5e-7, four roundings of 1: at roughness 0 and 45 degrees the center of the highlight is {smooth:.2f} times what "
-    "the formula means. Remedy: 1 - NdotH^2 as the squared length of cross(n, h), as in Filament.",
-    ("babylon-standard(metal=0)", "energy"): "Gloss over a white base: see the furnace of the white dielectric.",
-    ("babylon-standard(metal=0)", "reciprocity"): "As for metal; the factor is 1 + 0.04 (1 / E - 1).",
-    ("babylon-standard(metal=0)", "precision"): "As for metal.",
-    ("babylon-conserving", "energy"): "Gloss over a white base, and F at n.h (above).",
-    ("babylon-conserving", "reciprocity"): "As for the standard material.",
-    ("babylon-conserving", "precision"): "As for the standard material.",
-    ("babylon-conserving", "linearity"): "As for the coat: F0 of a mixed metal enters by its square.",
-    ("babylon-coat", "reciprocity"): "As for the standard material.",
-    ("babylon-coat", "energy"): "Gloss over a white base: see the furnace of the clear coat.",
-    ("babylon-coat", "pdf"): "No density of the engine's is judged here: the guide of Gonio, which stands in for one.",
+    "which is the difference of two numbers close to 1 at the center of the lobe. With a `MINIMUMVARIANCE` of 0.0005, "
+    "a2 can be as small as 2.5e-7, four times the rounding error of a 32-bit number near 1: at roughness 0 and 45 "
+    "degrees, the center of the highlight is {smooth:.2f} times the exact value of the formula. Remedy: compute 1 - "
+    "NdotH^2 as the squared length of cross(n, h), as in Filament.",
+    (
+        "babylon-standard(metal=0)",
+        "energy",
+    ): "A specular lobe is added over a white base; see the white-furnace results for the white dielectric.",
+    ("babylon-standard(metal=0)", "reciprocity"): "Same as for metal; the factor is 1 + 0.04 (1 / E - 1).",
+    ("babylon-standard(metal=0)", "precision"): "Same as for metal.",
+    (
+        "babylon-conserving",
+        "energy",
+    ): "A specular lobe is added over a white base, and F is evaluated at n.h (see above).",
+    ("babylon-conserving", "reciprocity"): "Same as for the standard material.",
+    ("babylon-conserving", "precision"): "Same as for the standard material.",
+    ("babylon-conserving", "linearity"): "Same as for the coat: the F0 of a partly metallic material enters squared.",
+    ("babylon-coat", "reciprocity"): "Same as for the standard material.",
+    (
+        "babylon-coat",
+        "energy",
+    ): "A specular lobe is added over a white base; see the white-furnace results for the clear coat.",
+    (
+        "babylon-coat",
+        "pdf",
+    ): "The engine provides no density; the one tested here is Gonio's guide, which is used instead.",
     (
         "babylon-coat",
         "linearity",
-    ): "`getR0RemappedForClearCoat` is a polynomial of the third order in the base's color; "
-    "besides, F0 is multiplied by 1 + F0 (1 / E - 1). It follows from the model.",
-    ("babylon-coat", "precision"): "As for the standard material, for the coat's lobe too.",
-    ("babylon-sheen", "reciprocity"): "`sheenAlbedoScaling` and `getEnergyConservationFactor` depend on n.v alone.",
+    ): "`getR0RemappedForClearCoat` is a third-degree polynomial in the color of the base; "
+    "in addition, F0 is multiplied by 1 + F0 (1 / E - 1). Nonlinearity follows from the model.",
+    ("babylon-coat", "precision"): "Same as for the standard material; the lobe of the coat is affected as well.",
+    ("babylon-sheen", "reciprocity"): "`sheenAlbedoScaling` and `getEnergyConservationFactor` depend only on n.v.",
     (
         "babylon-sheen",
         "energy",
-    ): "Gloss over a white base. At grazing angles the sheen adds: at sheen roughness 0.1 and "
-    "n.v 0.05 the lobe reflects {sheen_10:.2f}, while the table, by which the base is reduced, has "
-    "{sheen_taken_10:.2f}; at 0.25 it is {sheen_25:.2f} and {sheen_taken_25:.2f}.",
-    ("babylon-sheen", "precision"): "As for the standard material.",
-    ("babylon-anisotropic", "reciprocity"): "As for the standard material.",
-    ("babylon-anisotropic", "energy"): "As for the standard material, and the table is read at `roughness`.",
-    ("babylon-anisotropic", "precision"): "As for the standard material.",
+    ): "A specular lobe is added over a white base. At grazing angles, the sheen adds further light: at sheen "
+    "roughness 0.1 and n.v 0.05, the lobe reflects {sheen_10:.2f}, whereas the table, by which the base is reduced, "
+    "has {sheen_taken_10:.2f}; at sheen roughness 0.25, the values are {sheen_25:.2f} and {sheen_taken_25:.2f}.",
+    ("babylon-sheen", "precision"): "Same as for the standard material.",
+    ("babylon-anisotropic", "reciprocity"): "Same as for the standard material.",
+    (
+        "babylon-anisotropic",
+        "energy",
+    ): "Same as for the standard material; in addition, the table is read at `roughness`.",
+    ("babylon-anisotropic", "precision"): "Same as for the standard material.",
 }
 
 ENGINE = Engine(
@@ -210,27 +229,32 @@ ENGINE = Engine(
             "White dielectric, clear coat of this roughness",
             "babylon-coat",
             lambda r: {"rough": 0.5, "coatRough": r},
+            "White dielectric with a clear coat; roughness of the coat varies",
         ),
         Furnace(
             "White dielectric, white sheen of this roughness",
             "babylon-sheen",
             lambda r: {"rough": 0.5, "sheenRough": r},
+            "White dielectric with white sheen; roughness of the sheen varies",
         ),
     ),
     remarks={
-        "White dielectric": "By default the diffuse lobe is scaled by 1 - 0.04 at all angles: at roughness 0.1 and n.v "
-        "0.05 gloss alone returns {gloss:.2f}, and the diffuse lobe keeps {diffuse_standard:.2f}.",
-        "White dielectric, legacy conservation off": "At the same angle the diffuse lobe keeps "
-        "{diffuse_conserving:.2f}: see the angle of F below. Light from an environment map is reduced by the albedo of "
-        "the specular lobe instead.",
-        "White, half metal": "F0 is mixed before the compensation, 1 + F0 (1 / E - 1), which is meant for one F0.",
-        "White metal, anisotropy 0.7": "The table is read at `roughness`, while the lobe is wider along the tangent.",
-        "White dielectric, clear coat of this roughness": "At roughness 0.1 and n.v 0.05 coat and gloss over a black "
-        "base return {coated_black:.2f}; the white base, which returns {bare:.2f} without coat, is scaled by 1 - "
-        "F(v.h) of each light. At grazing angles most lights have a large v.h and a small F, while all lights together "
-        "reflect far more. At normal incidence the coat scales the base by 0.96, and adds less than it takes.",
-        "White dielectric, white sheen of this roughness": "With `sheen.albedoScaling`; for narrow sheen see *energy* "
-        "below.",
+        "White dielectric": "By default, the diffuse lobe is scaled by 1 - 0.04 at all angles. At roughness 0.1 and "
+        "n.v 0.05, the specular lobe alone returns {gloss:.2f}, and the diffuse lobe still returns "
+        "{diffuse_standard:.2f}.",
+        "White dielectric, legacy conservation off": "At the same roughness and angle, the diffuse lobe returns "
+        "{diffuse_conserving:.2f}: see the angle of F below. For light from an environment map, the diffuse lobe is "
+        "instead reduced by the albedo of the specular lobe.",
+        "White, half metal": "F0 is mixed before the compensation factor, 1 + F0 (1 / E - 1), is applied, although "
+        "this factor is meant for a single F0.",
+        "White metal, anisotropy 0.7": "The table is read at `roughness`, whereas the lobe is wider along the tangent.",
+        "White dielectric, clear coat of this roughness": "At roughness 0.1 and n.v 0.05, the coat and the specular "
+        "lobe over a black base return {coated_black:.2f}; the white base, which returns {bare:.2f} without a coat, is "
+        "scaled by 1 - F(v.h) for each light. At grazing view angles, v.h is large and F small for most light "
+        "directions, although the light reflected from all directions together is far more than this F suggests. At "
+        "normal incidence, the coat scales the base by 0.96 and adds less light than it removes.",
+        "White dielectric, white sheen of this roughness": "The sheen uses `sheen.albedoScaling`; for narrow sheen, "
+        "see *energy* below.",
     },
     trials=trials,
     sections=sections,

@@ -20,11 +20,21 @@ Make = Callable[..., BSDF]  # a material of a class by its parameters
 
 
 class Furnace(NamedTuple):
-    """A white furnace: the material, and its parameters for a roughness."""
+    """A white furnace: the material, and its parameters for a roughness.
+
+    title    its key in cards.json and in the output of the programs
+    heading  its name on the page and in the picture; empty: the title
+    """
 
     title: str
     material: str
     parameters: Callable[[float], dict[str, float]]
+    heading: str = ""
+
+    @property
+    def label(self) -> str:
+        """The name to print."""
+        return self.heading or self.title
 
 
 class Engine(NamedTuple):
@@ -41,6 +51,7 @@ class Engine(NamedTuple):
     causes     (material, law) or (material, law, version) -> cause and remedy
     programs   files of report-cards/engines/programs that show it without Gonio
     origin     where a release comes from, as the page words it
+    source     the first words of the page with `{version}` in them; empty: package, release and origin
     again      for an engine that is not on npm: the commands that make the folder of shaders, `{version}` in them
     made       the folder of a release holds the shaders and adapters themselves
     language   suffix of the shaders
@@ -61,6 +72,7 @@ class Engine(NamedTuple):
     causes: Mapping[tuple[str, ...], str]
     programs: tuple[str, ...]
     origin: str = "npm"
+    source: str = ""
     again: str = ""
     made: bool = False
     language: str = "glsl"

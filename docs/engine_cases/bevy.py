@@ -10,10 +10,10 @@ from .base import Engine, Furnace, furnace, material, single_scattering
 
 PLACES = ((0.25, 1.0), (0.5, 1.0), (0.75, 1.0), (1.0, 1.0), (1.0, 0.5), (1.0, 0.25))
 
-INTRO = """The lighting of `StandardMaterial` by a directional light: `Fd_Burley`, `specular`, `specular_anisotropy` and
-`specular_clearcoat` of `pbr_lighting.wgsl`, combined as `directional_light` does. Environments, area lights and
-transmission are not judged. The feature `dfg_lut`, which is no default one, is off: `F_AB` is a polynomial; with the
-feature it reads a table, which was not judged."""
+INTRO = """This card tests the lighting of `StandardMaterial` by a directional light: `Fd_Burley`, `specular`,
+`specular_anisotropy` and `specular_clearcoat` of `pbr_lighting.wgsl`, combined as in `directional_light`. Environments,
+area lights and transmission are not tested. The feature `dfg_lut`, which is not enabled by default, is off, so that
+`F_AB` is a polynomial; with the feature enabled, `F_AB` is read from a table, which was not tested."""
 
 
 def polynomial(rough: float, cosine: float) -> float:
@@ -64,42 +64,46 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     )
     return f"""## The polynomial behind the energy compensation
 
-`specular_multiscatter` multiplies the lobe by 1 + F0 (1 / (A + B) - 1), where A + B = `F_AB` is meant to be E, the
-albedo of the lobe at F = 1: white metal then returns E / E = 1. Without `DFG_LUT`, A + B is Karis's polynomial for
-mobile devices, which was fitted to the split sum of environments, and is no E of `V_SmithGGXCorrelated`; its
-sum A + B does not depend on n.v at all, because the terms that do cancel:
+`specular_multiscatter` multiplies the lobe by 1 + F0 (1 / (A + B) - 1), where A + B = `F_AB` should equal E, the
+albedo of the lobe at F = 1, so that white metal returns E / E = 1. Without `DFG_LUT`, A + B is Karis's polynomial for
+mobile devices, which was fitted to the split sum for environment lighting and is not E of `V_SmithGGXCorrelated`. The
+sum A + B does not depend on n.v at all, because the terms that contain n.v cancel:
 
 | roughness | n.v | E (integral) | A + B | E / (A + B) | white metal of the shader |
 |---|---|---|---|---|---|
 {rows}
 
-Without Gonio: at n.v 1 and roughness 1 the polynomial is -0.572 + 1.04 + 0.022 - 0.04 = 0.45, and E of GGX with
-alpha 1 there is 1 - ln 2 = 0.307. Remedy: the table of `dfg_lut` as a
-default, or a fit to E of the lobe that is used.
+To check this by hand: at n.v 1 and roughness 1, the polynomial gives -0.572 + 1.04 + 0.022 - 0.04 = 0.45, whereas E of
+GGX with alpha 1 is 1 - ln 2 = 0.307 at this angle. Remedy: use the table of `dfg_lut` by default, or a fit to E of the
+lobe that is used.
 
 ## The roughness of anisotropic materials
 
 `specular_anisotropy` sets `ab = roughness * roughness`, but its argument is `layers[LAYER_BASE].roughness`, which
-`perceptualRoughnessToRoughness` has squared already: alpha is the fourth power of the perceptual roughness, and a
-material turns glossier when anisotropy is enabled. BRDF times cosine at normal incidence, color 0.001:
+`perceptualRoughnessToRoughness` has already squared. Alpha is therefore the fourth power of the perceptual roughness,
+and a material becomes glossier when anisotropy is enabled. The table gives BRDF times cosine at
+normal incidence, with color 0.001:
 
 | perceptual roughness r | anisotropic, strength 0 | isotropic at r | isotropic at r^2 |
 |---|---|---|---|
 {peaks}
 
-glTF's KHR_materials_anisotropy means `mix(alpha, 1, strength^2)` with alpha = r^2. Remedy: `ab = roughness`.
-`V_GGX_anisotropic` also ends in `saturate(v)`, although v exceeds 1 at grazing angles: see the same term of
+KHR_materials_anisotropy of glTF specifies `mix(alpha, 1, strength^2)` with alpha = r^2. Remedy: set `ab = roughness`.
+Moreover, `V_GGX_anisotropic` ends in `saturate(v)`, although v exceeds 1 at grazing angles: see the same term of
 [glTF-Sample-Viewer](gltf-viewer.md#the-clamp-of-the-anisotropic-masking-term)."""
 
 
-_METAL = "The polynomial `F_AB`: see above. Remedy: the table of `dfg_lut`, or a fit to E of the lobe."
+_METAL = (
+    "The polynomial `F_AB` is not E of the lobe: see above. Remedy: use the table of `dfg_lut`, or a fit to E of the "
+    "lobe."
+)
 _COLOR = (
-    "`specular_multiscatter` multiplies F by 1 + F0 (1 / (A + B) - 1), which is quadratic in color, as every such "
-    "compensation is; light that is reflected twice is colored twice."
+    "`specular_multiscatter` multiplies F by 1 + F0 (1 / (A + B) - 1), so that the result is quadratic in color, as "
+    "with every compensation of this kind; light that is reflected twice is colored twice."
 )
 _DIGITS = (
-    "`D_GGX` computes 1 - NdotH * NdotH, which near the lobe's center is the difference of two numbers near 1. "
-    "Remedy: the squared length of cross(N, H), as in Filament."
+    "`D_GGX` computes 1 - NdotH * NdotH, which is the difference of two numbers close to 1 near the center of the "
+    "lobe. Remedy: compute it as the squared length of cross(N, H), as in Filament."
 )
 CAUSES = {
     ("bevy-standard", "energy"): _METAL,
@@ -110,8 +114,9 @@ CAUSES = {
     ("bevy-anisotropic", "linearity"): _COLOR,
     ("bevy-standard", "precision"): _DIGITS,
     ("bevy-coat", "precision"): _DIGITS,
-    ("bevy-coat", "positivity"): "`V_Kelemen` divides by LdotH * LdotH without a floor. Where both directions graze "
-    "the surface from opposite sides it overflows; with coat 0 it is infinity times 0. Remedy: a smallest LdotH.",
+    ("bevy-coat", "positivity"): "`V_Kelemen` divides by LdotH * LdotH without a lower bound. At grazing angles from "
+    "opposite sides, the quotient overflows; with coat = 0, the product is then infinity times 0. Remedy: a lower "
+    "bound on LdotH.",
 }
 
 ENGINE = Engine(
@@ -125,15 +130,20 @@ ENGINE = Engine(
         Furnace("White metal", "bevy-standard", lambda r: {"rough": r}),
         Furnace("White dielectric", "bevy-standard", lambda r: {"rough": r, "metal": 0.0}),
         Furnace("White metal, anisotropy 0.7", "bevy-anisotropic", lambda r: {"rough": r, "strength": 0.7}),
-        Furnace("White dielectric, coat of this roughness", "bevy-coat", lambda r: {"metal": 0.0, "coatRough": r}),
+        Furnace(
+            "White dielectric, coat of this roughness",
+            "bevy-coat",
+            lambda r: {"metal": 0.0, "coatRough": r},
+            "White dielectric with a coat; roughness of the coat varies",
+        ),
     ),
     remarks={
         "White metal": "See [the polynomial](#the-polynomial-behind-the-energy-compensation).",
-        "White dielectric": "`directional_light` adds the diffuse lobe and the specular one; nothing takes from the "
-        "base what the gloss reflects. `Fd_Burley` gains light at high roughness, too.",
+        "White dielectric": "`directional_light` adds the diffuse and specular lobes without reducing the diffuse lobe "
+        "by the light that the specular lobe reflects. `Fd_Burley` also gains light at high roughness.",
         "White metal, anisotropy 0.7": "See [the roughness](#the-roughness-of-anisotropic-materials).",
-        "White dielectric, coat of this roughness": "The base has roughness 0.5 and is weighted by 1 - Fc of each "
-        "lamp's half vector, as in Filament: at grazing angles most lamps have a small Fc.",
+        "White dielectric, coat of this roughness": "The base has roughness 0.5 and is weighted by 1 - Fc at the "
+        "half vector of each light, as in Filament: at grazing view angles, Fc is small for most light directions.",
     },
     trials=trials,
     sections=sections,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from .base import Engine, Furnace, furnace, material
 
-INTRO = """The viewer that shows what the glTF specification means: `BRDF_lambertian`, `BRDF_specularGGX` and
-`BRDF_specularGGXAnisotropy`, mixed by Fresnel's terms as the loop over lamps in its program does. Sheen, clear coat,
-iridescence, transmission and environments are not judged."""
+INTRO = """This is the reference viewer for glTF. The card tests `BRDF_lambertian`, `BRDF_specularGGX` and
+`BRDF_specularGGXAnisotropy`, mixed by the Fresnel terms as in the shader's loop over lights. Sheen, clear coat,
+iridescence, transmission and environments are not tested."""
 
 
 def trials(folder: Path) -> dict[str, float]:
@@ -34,24 +34,29 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     return f"""## The clamp of the anisotropic masking term
 
 `V_GGX_anisotropic` ends in `clamp(v, 0.0, 1.0)`. V is G / (4 n.l n.v), which is 1/4 at normal incidence and exceeds 1
-wherever n.l n.v is less than a quarter of G, at grazing angles: there light is lost. `V_GGX` has no such clamp. White
-metal with anisotropy 0, for which both terms are the same function:
+where n.l n.v < G / 4, that is, at grazing angles. There, the clamp loses light. `V_GGX` has no such clamp. The albedo
+of white metal with anisotropy 0, for which both terms are the same function, is:
 
 | roughness | n.v | `BRDF_specularGGX` | `BRDF_specularGGXAnisotropy` |
 |---|---|---|---|
 {rows}
 
-Remedy: `max(v, 0.0)`, or the test of `V_GGX`."""
+Remedy: use `max(v, 0.0)`, or the test for a positive denominator that `V_GGX` uses."""
 
 
 CAUSES = {
-    ("gltf-standard", "precision"): "`D_GGX` computes `NdotH^2 (a2 - 1) + 1`, which near the lobe's center is the "
-    "difference of two numbers near 1. Remedy: 1 - NdotH^2 as the squared length of cross(n, h), as in Filament.",
-    ("gltf-standard", "energy"): "Gloss over a white base: see the furnace of the white dielectric.",
-    ("gltf-anisotropic", "positivity"): "At roughness 0 and strength 0 both widths of `D_GGX_anisotropic` are so small "
-    "that a2 / dot(f, f) is 0 / 0. Remedy: a smallest alpha for `at` too.",
-    ("gltf-standard", "positivity"): "At roughness 0 `D_GGX` divides 0 by 0 where h is the normal. Remedy: a smallest "
-    "alpha.",
+    ("gltf-standard", "precision"): "`D_GGX` computes `NdotH^2 (a2 - 1) + 1`, which is the difference of two "
+    "numbers close to 1 near the center of the lobe. Remedy: compute 1 - NdotH^2 as the squared length of cross(n, h), "
+    "as in Filament.",
+    ("gltf-standard", "energy"): "A specular lobe is added over a white base; see the white-furnace results for the "
+    "white dielectric.",
+    (
+        "gltf-anisotropic",
+        "positivity",
+    ): "At roughness 0 and strength 0, both widths of `D_GGX_anisotropic` are so small "
+    "that a2 / dot(f, f) is 0 / 0. Remedy: a lower bound also on the tangential width, `at`.",
+    ("gltf-standard", "positivity"): "At roughness 0, `D_GGX` divides 0 by 0 where h is the normal. Remedy: a lower "
+    "bound on alpha.",
 }
 
 ENGINE = Engine(
@@ -67,10 +72,12 @@ ENGINE = Engine(
         Furnace("White metal, anisotropy 0.7", "gltf-anisotropic", lambda r: {"rough": r, "strength": 0.7}),
     ),
     remarks={
-        "White metal": "Single scattering without compensation, as the specification has it; the loss is that of GGX.",
-        "White dielectric": "`mix` of the diffuse and the specular lobe by F at the half vector of each lamp, as the "
-        "specification's appendix B has it. At grazing angles most lamps have a large v.h and a small F, so that the "
-        "diffuse lobe keeps nearly all, while the specular lobe reflects far more.",
+        "White metal": "The lobe models single scattering only, without compensation, as in the specification; the "
+        "loss is that of single-scattering GGX.",
+        "White dielectric": "The diffuse and specular lobes are blended with `mix`, using F at the half vector for "
+        "each light, as in appendix B of the specification. At grazing view angles, v.h is large and F small for most "
+        "light directions, so the diffuse lobe keeps nearly its full weight, although the specular lobe reflects far "
+        "more than this F suggests.",
     },
     trials=trials,
     sections=sections,

@@ -8,10 +8,10 @@ from .base import Engine, Furnace, furnace, material, single_scattering
 
 PLACES = ((0.25, 0.05), (0.25, 0.25), (0.5, 0.25), (0.5, 1.0), (0.75, 0.5), (1.0, 0.5))
 
-INTRO = """`light_compute` of the clustered forward renderer for one directional light, as `StandardMaterial3D` uses it:
-Burley's diffuse lobe and GGX, with clear coat and anisotropy. Environments, rim, backlight and transmittance are not
-judged. Roughness and metallic are not rounded to 8 bits, as the renderer does. Later releases multiply the lobe by an
-energy compensation, which was not judged."""
+INTRO = """This card tests `light_compute` of the clustered forward renderer, with one directional light and the
+settings of `StandardMaterial3D`: Burley's diffuse lobe and GGX, with clear coat and anisotropy. Environments, rim,
+backlight and transmittance are not tested. Unlike the renderer, this test does not round roughness and metallic to 8
+bits. Later releases multiply the lobe by an energy-compensation factor, which was not tested."""
 
 
 def trials(folder: Path) -> dict[str, float]:
@@ -50,47 +50,47 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     return f"""## Two masking terms
 
 `V_GGX` is Hammon's approximation, 0.5 / mix(2 n.l n.v, n.l + n.v, alpha) (PBR Diffuse Lighting for GGX+Smith
-Microsurfaces, 2017); `V_GGX_anisotropic` is the height-correlated Smith term itself. At strength 0 both mean the same
-surface, but a material turns brighter when anisotropy is enabled. White metal:
+Microsurfaces, 2017); `V_GGX_anisotropic` is the exact height-correlated Smith term. At strength 0, both describe
+the same surface, yet a material becomes brighter when anisotropy is enabled. The albedo of white metal is:
 
 | roughness | n.v | E (integral) | `V_GGX` | `V_GGX_anisotropic` |
 |---|---|---|---|---|
 {rows}
 
-Without Gonio: for n.l = n.v = 1/4 and alpha = 1/4, V is 0.5 / (0.25 sqrt(1/16 + 15/256) 2) = 2.87 by Smith's term and
-0.5 / (0.75 / 8 + 0.25 / 2) = 2.29 by Hammon's. Remedy: `V_GGX_anisotropic` with two equal widths, or the two square
-roots of the isotropic term.
+To check this by hand: for n.l = n.v = 1/4 and alpha = 1/4, V is 0.5 / (0.25 sqrt(1/16 + 15/256) 2) = 2.87 with Smith's
+term and 0.5 / (0.75 / 8 + 0.25 / 2) = 2.29 with Hammon's. Remedy: call `V_GGX_anisotropic` with two equal widths, or
+use the exact isotropic Smith term, which has two square roots.
 
 ## The clear coat is added
 
-As a comment in `light_compute` says, nothing takes from the base what the coat reflects. White metal of roughness
-0.5 with a coat of roughness 0.1:
+As a comment in `light_compute` says, the base is not reduced by the light that the coat reflects. The albedo of white
+metal of roughness 0.5, without a coat and with a coat of roughness 0.1, is:
 
 | n.v | without coat | with coat |
 |---|---|---|
 {coats}
 
-Remedy: `diffuse_light` and `specular_light` of the base times 1 - F of the coat, as in Filament. `Gr` divides by
-`cLdotH * cLdotH` without a floor: see [Bevy](bevy.md)."""
+Remedy: multiply the base's `diffuse_light` and `specular_light` by 1 - F of the coat, as in Filament. `Gr` divides by
+`cLdotH * cLdotH` without a lower bound: see [Bevy](bevy.md)."""
 
 
 _ADDED = (
-    "`light_compute` adds the diffuse and the specular lobe; nothing takes from the base what the gloss reflects. See "
-    "the furnace of the white dielectric."
+    "`light_compute` adds the diffuse and specular lobes without reducing the diffuse lobe by the light that the "
+    "specular lobe reflects. See the white-furnace results for the white dielectric."
 )
-_COAT = "The coat is added: see above."
+_COAT = "The coat is added without reducing the base: see above."
 _DIGITS = (
-    "`D_GGX` computes 1 - NdotH * NdotH, which near the lobe's center is the difference of two numbers near 1. "
-    "Remedy: the squared length of cross(N, H), as in Filament."
+    "`D_GGX` computes 1 - NdotH * NdotH, which is the difference of two numbers close to 1 near the center of the "
+    "lobe. Remedy: compute it as the squared length of cross(N, H), as in Filament."
 )
 CAUSES = {
     ("godot-standard", "energy"): _ADDED,
     ("godot-anisotropic", "energy"): _ADDED,
     ("godot-coat", "energy"): _COAT,
     ("godot-coat", "precision"): _DIGITS,
-    ("godot-coat", "positivity"): "`Gr` divides by cLdotH * cLdotH without a floor. Where both directions graze the "
-    "surface from opposite sides it overflows; with coat 0 it is infinity times 0. Remedy: a smallest cLdotH, which "
-    "later releases have.",
+    ("godot-coat", "positivity"): "`Gr` divides by cLdotH * cLdotH without a lower bound. At grazing angles from "
+    "opposite sides, the quotient overflows; with coat = 0, the product is then infinity times 0. Remedy: a lower "
+    "bound on cLdotH, as in later releases.",
 }
 
 ENGINE = Engine(
@@ -104,14 +104,19 @@ ENGINE = Engine(
         Furnace("White metal", "godot-standard", lambda r: {"rough": r}),
         Furnace("White dielectric", "godot-standard", lambda r: {"rough": r, "metal": 0.0}),
         Furnace("White metal, anisotropy 0.7", "godot-anisotropic", lambda r: {"rough": r, "strength": 0.7}),
-        Furnace("White dielectric, coat of this roughness", "godot-coat", lambda r: {"metal": 0.0, "coatRough": r}),
+        Furnace(
+            "White dielectric, coat of this roughness",
+            "godot-coat",
+            lambda r: {"metal": 0.0, "coatRough": r},
+            "White dielectric with a coat; roughness of the coat varies",
+        ),
     ),
     remarks={
-        "White metal": "Single scattering without compensation; it loses more than GGX: see [the masking "
-        "terms](#two-masking-terms).",
-        "White dielectric": "The diffuse and the specular lobe are added. `DIFFUSE_BURLEY` gains light at high "
-        "roughness, too.",
-        "White metal, anisotropy 0.7": "The loss is that of GGX.",
+        "White metal": "The lobe models single scattering only, without compensation, and loses more light than GGX "
+        "with the exact Smith term: see [the masking terms](#two-masking-terms).",
+        "White dielectric": "The diffuse and specular lobes are added without reducing the diffuse lobe. "
+        "`DIFFUSE_BURLEY` also gains light at high roughness.",
+        "White metal, anisotropy 0.7": "The loss is that of single-scattering GGX with the exact Smith term.",
         "White dielectric, coat of this roughness": "The base has roughness 0.5; see [the "
         "coat](#the-clear-coat-is-added).",
     },
@@ -119,7 +124,8 @@ ENGINE = Engine(
     sections=sections,
     causes=CAUSES,
     programs=(),
-    origin="its repository (a commit between 4.3 and 4.5)",
+    origin="its repository",
+    source="Godot at commit {version} (between releases 4.3 and 4.5)",
     again="git clone https://github.com/godotengine/godot godot-{version}\n"
     "git -C godot-{version} checkout {version}\n"
     "gonio adopt godot-{version} -o godot",

@@ -8,10 +8,10 @@ from .base import Engine, Furnace, furnace, material, single_scattering
 
 PLACES = ((0.25, 1.0), (0.5, 1.0), (0.5, 0.25), (0.75, 0.5), (1.0, 1.0), (1.0, 0.5), (1.0, 0.05))
 
-INTRO = """GLSL that `GlslShaderGenerator` writes for `open_pbr_surface` and `standard_surface`, lit by one directional
-light; inputs have their defaults but for color 1, roughness 0.5 and those that a table names. Environments,
-transmission and subsurface scattering are not judged. `DIRECTIONAL_ALBEDO_METHOD` is 0, the generator's default:
-albedos are fits."""
+INTRO = """This card tests the GLSL that `GlslShaderGenerator` writes for `open_pbr_surface` and `standard_surface`, lit
+by one directional light. Inputs have their default values except for color 1, roughness 0.5 and the inputs that the
+heading of a table names. Environments, transmission and subsurface scattering are not tested.
+`DIRECTIONAL_ALBEDO_METHOD` is 0, the generator's default, so that albedos are computed from fits."""
 
 
 def trials(folder: Path) -> dict[str, float]:
@@ -37,22 +37,23 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     return f"""## The fit behind the energy compensation
 
 `mx_ggx_energy_compensation` multiplies the lobe by 1 + F (1 - E) / E, with E from `mx_ggx_dir_albedo_analytic`, a
-rational function. White metal returns the integral's E over the fit's:
+rational function. The albedo of white metal is E of the integral divided by E of the fit:
 
 | roughness | n.v | E (integral) | E of the fit | white metal |
 |---|---|---|---|---|
 {rows}
 
-E of the fit is computed from the two other columns."""
+E of the fit is computed from the other two columns."""
 
 
 _LAYERS = (
-    "`mx_layer_bsdf` weights the base by 1 - E(n.v) of the layer, and `mx_ggx_energy_compensation` takes E at n.v: "
-    "both depend on the view alone. That keeps white furnaces closed and is deliberate in a rasterizer."
+    "`mx_layer_bsdf` weights the base by 1 - E(n.v) of the layer, and `mx_ggx_energy_compensation` evaluates E at "
+    "n.v: both depend only on the view direction. This keeps the albedo in white furnaces close to 1 and is deliberate "
+    "in a rasterizer."
 )
 _GLOSS = (
-    "`mx_dielectric_bsdf` reflects by the exact Fresnel term, but takes from its base the fit of E for Schlick's, "
-    "`mx_ggx_dir_albedo(n.v, alpha, F0, 1)`: see the furnace of the white dielectric. "
+    "`mx_dielectric_bsdf` reflects light by the exact Fresnel term, but reduces its base by the fit of E for Schlick's "
+    "approximation, `mx_ggx_dir_albedo(n.v, alpha, F0, 1)`: see the white-furnace results for the white dielectric. "
     "Remedy: a fit of E for the exact term."
 )
 CAUSES = {
@@ -72,16 +73,26 @@ ENGINE = Engine(
     furnaces=(
         Furnace("White metal, OpenPBR", "open-pbr-surface", lambda r: {"rough": r, "metalness": 1.0}),
         Furnace("White dielectric, OpenPBR", "open-pbr-surface", lambda r: {"rough": r}),
-        Furnace("Coat of this roughness, OpenPBR", "open-pbr-surface", lambda r: {"coat": 1.0, "coatRough": r}),
-        Furnace("Fuzz of this roughness, OpenPBR", "open-pbr-surface", lambda r: {"fuzz": 1.0, "fuzzRough": r}),
+        Furnace(
+            "Coat of this roughness, OpenPBR",
+            "open-pbr-surface",
+            lambda r: {"coat": 1.0, "coatRough": r},
+            "White dielectric with a coat, OpenPBR; roughness of the coat varies",
+        ),
+        Furnace(
+            "Fuzz of this roughness, OpenPBR",
+            "open-pbr-surface",
+            lambda r: {"fuzz": 1.0, "fuzzRough": r},
+            "White dielectric with fuzz, OpenPBR; roughness of the fuzz varies",
+        ),
         Furnace("White metal, Standard Surface", "standard-surface", lambda r: {"rough": r, "metalness": 1.0}),
         Furnace("White dielectric, Standard Surface", "standard-surface", lambda r: {"rough": r}),
     ),
     remarks={
-        "White metal, OpenPBR": "Within the errors of [the fit](#the-fit-behind-the-energy-compensation), which are "
-        "largest for narrow lobes at grazing angles.",
+        "White metal, OpenPBR": "The deviations are those of [the fit](#the-fit-behind-the-energy-compensation), which "
+        "are largest for narrow lobes at grazing angles.",
         "White metal, Standard Surface": "`mx_artistic_ior` clamps the reflectivity to 0.99, so that white metal loses "
-        "about 1 % more than that of OpenPBR.",
+        "about 1 % more light than that of OpenPBR.",
     },
     trials=trials,
     sections=sections,

@@ -8,9 +8,9 @@ import numpy as np
 
 from .base import Engine, Furnace, asymmetry, furnace, material
 
-INTRO = """The BSDF of the WebGL path tracer: `bsdfResult` for f and its density, `bsdfSample` for directions, of an
-opaque surface without maps at the first hit of a path. Random numbers come from the law. Transmission and fog are not
-judged."""
+INTRO = """This card tests the BSDF of the WebGL path tracer: `bsdfResult` for f and its density, and `bsdfSample` for
+directions, of an opaque surface without texture maps at the first hit of a path. The test supplies the random numbers.
+Transmission and fog are not tested."""
 
 LOBES = {
     "metal": {},
@@ -37,29 +37,32 @@ def trials(folder: Path) -> dict[str, float]:
 
 
 CAUSES = {
-    ("pathtracer", "positivity"): "NaN where the light lies in the view's direction: `dielectricFresnel` takes the "
-    "square root of 1 - cos^2, and dot(wo, wh) may exceed 1 by a rounding. Remedy: clamp the cosine, or max(0, ...) "
-    "under the root.",
-    ("pathtracer", "weight"): "unexplained; it is of the size of roundings in 64 bits, at roughness 0 alone.",
-    ("pathtracer", "pdf"): "`ggxDistribution` raises alpha^2 to 1e-6, while `ggxDirection` draws normals with the "
-    "alpha given: below roughness 0.03 the density is wider than the samples.",
-    ("pathtracer", "reciprocity"): "Two terms. `sheenColor` lacks the cosine of the light, which `diffuseEval` and "
-    "`specularEval` include: for cosines of 0.2 and 0.8 the sheen adds {sheen_there:.4f} and, exchanged, "
-    "{sheen_back:.4f}, where a ratio of 4 is meant. In `diffuseEval` the retroreflection `rr` grows by the squared "
-    "Schlick weight of the light, `fl`, where Burley has the squared cosine of the half angle, which is the same for "
-    "both directions. With one lobe at a time f(wo, wi) and f(wi, wo) differ by at most {metal:.0e} of their value for "
-    "metal, {coat:.0e} with clear coat, {dielectric:.2f} for a dielectric of roughness 0.5 ({smooth:.0e} at "
-    "roughness 0, where the term vanishes) and {sheen:.2f} with sheen.",
+    ("pathtracer", "positivity"): "The result is NaN where the directions of light and view coincide: "
+    "`dielectricFresnel` takes the square root of 1 - cos^2, and dot(wo, wh) may exceed 1 because of rounding. Remedy: "
+    "clamp the cosine, or use max(0, ...) under the square root.",
+    (
+        "pathtracer",
+        "weight",
+    ): "unexplained; the size is that of 64-bit rounding errors, and only roughness 0 is affected.",
+    ("pathtracer", "pdf"): "`ggxDistribution` uses an alpha^2 of at least 1e-6, whereas `ggxDirection` samples normals "
+    "with the given alpha: below roughness 0.03, the density is wider than the distribution of the samples.",
+    ("pathtracer", "reciprocity"): "Two terms are responsible. `sheenColor` lacks the cosine of the light, which "
+    "`diffuseEval` and `specularEval` include: for cosines of 0.2 and 0.8, the sheen adds {sheen_there:.4f} and, with "
+    "the directions exchanged, {sheen_back:.4f}, although the ratio should be 4. In `diffuseEval`, the retroreflection "
+    "`rr` grows with the squared Schlick weight of the light, `fl`, whereas Burley uses the squared cosine of the half "
+    "angle, which is the same for both directions. With one lobe at a time, f(wo, wi) and f(wi, wo) differ by at most "
+    "{metal:.0e} of their value for metal, {coat:.0e} with clear coat, {dielectric:.2f} for a dielectric of roughness "
+    "0.5 ({smooth:.0e} at roughness 0, where the term vanishes) and {sheen:.2f} with sheen.",
     (
         "pathtracer",
         "energy",
-    ): "At color 0 and roughness 0 the density is wider than the samples (see *pdf*), so that a few samples hold much "
-    "of the light. At other values light is gained by gloss over a white base: `specularEval` reflects "
-    "by Schlick's formula up to 1 at grazing "
-    "angles, while `diffuseEval` keeps 1 - F of the exact Fresnel equations, at the half vector of each light. With "
-    "sheen the missing cosine adds light as well (see *reciprocity*).",
-    ("pathtracer", "precision"): "`ggxShadowMaskG1` takes the tangent of the arc cosine of wo.z, which loses digits "
-    "beyond 89.9 degrees; tan^2 = (1 - z^2) / z^2 needs neither function. The size is invisible.",
+    ): "At color 0 and roughness 0, the density is wider than the distribution of the samples (see *pdf*), so that a "
+    "few samples hold much of the light. At other values, light is gained because a specular lobe is added over a "
+    "white base: `specularEval` follows Schlick's formula and reflects up to 1 at grazing angles, whereas "
+    "`diffuseEval` is weighted by 1 - F of the exact Fresnel equations, at the half vector of each light. With sheen, "
+    "the missing cosine adds light as well (see *reciprocity*).",
+    ("pathtracer", "precision"): "`ggxShadowMaskG1` computes the tangent of the arc cosine of wo.z, which loses digits "
+    "beyond 89.9 degrees; tan^2 = (1 - z^2) / z^2 needs neither function. An error of this size is invisible.",
 }
 
 
@@ -69,8 +72,9 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     grazing, normal = last["sheen_grazing"], last["sheen_normal"]
     return f"""## The cosine of the sheen
 
-`bsdfEval` adds `sheenColor`, D G / (4 cos cos), to values that contain the light's cosine. Without it the albedo of a
-white sheen of roughness 0.5 over a black metal is {grazing:.2f} at n.v 0.05 and {normal:.2f} at n.v 1.
+`bsdfEval` adds `sheenColor`, D G / (4 cos cos), to values that include the cosine of the light. Because the sheen lacks
+this cosine, the albedo of white sheen of roughness 0.5 over black metal is {grazing:.2f} at n.v 0.05 and {normal:.2f}
+at n.v 1.
 Remedy: multiply by wi.z, as in `specularEval`."""
 
 
@@ -85,12 +89,14 @@ ENGINE = Engine(
         Furnace("White metal", "pathtracer", lambda r: {"roughness": r}),
         Furnace("White dielectric", "pathtracer", lambda r: {"roughness": r, "metalness": 0.0}),
         Furnace("White dielectric, white sheen of this roughness", "pathtracer",
-                lambda r: {"roughness": 0.5, "metalness": 0.0, "sheen": 1.0, "sheenRoughness": r}),
+                lambda r: {"roughness": 0.5, "metalness": 0.0, "sheen": 1.0, "sheenRoughness": r},
+                "White dielectric with white sheen; roughness of the sheen varies"),
     ),
     remarks={
-        "White metal": "Single scattering without compensation, as in most path tracers; the loss is that of GGX.",
+        "White metal": "The lobe models single scattering only, without compensation, as in most path tracers; the "
+        "loss is that of single-scattering GGX.",
         "White dielectric": "See *energy* below.",
-        "White dielectric, white sheen of this roughness": "See the cosine of the sheen.",
+        "White dielectric, white sheen of this roughness": "See the cosine of the sheen below.",
     },
     trials=trials,
     sections=sections,

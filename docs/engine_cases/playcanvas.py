@@ -8,12 +8,12 @@ import numpy as np
 
 from .base import Engine, Furnace, furnace, material, single_scattering
 
-INTRO = """The lit material with the metalness workflow under one directional light: the chunks `getLightDiffuse`,
-`getLightSpecular`, `getFresnel`, `getSpecularModulate` and `combineColor`, called in the order of `litForwardBackend`
-and `lightFunctionLight`, without environment, area lights, clear coat and iridescence. A lamp of intensity 1 has
-irradiance 1 in the furnaces of metal. Beside a diffuse lobe its intensity is 1 / pi, so that white paper returns 1: see
-the scale of gloss below."""
-PAPER = 1.0 / np.pi  # intensity of a lamp at which the diffuse lobe reflects its irradiance
+INTRO = """This card tests the lit material with the metalness workflow under one directional light: the chunks
+`getLightDiffuse`, `getLightSpecular`, `getFresnel`, `getSpecularModulate` and `combineColor`, called in the order of
+`litForwardBackend` and `lightFunctionLight`, without environment, area lights, clear coat or iridescence. In the
+furnaces of metal, a light of intensity 1 has irradiance 1. For materials with a diffuse lobe, the intensity is 1 / pi,
+so that a white diffuse surface returns 1: see [the scale of both lobes](#gloss-beside-the-diffuse-lobe)."""
+PAPER = 1.0 / np.pi  # intensity of a light at which the diffuse lobe reflects its irradiance
 
 
 def trials(folder: Path) -> dict[str, float]:
@@ -55,30 +55,31 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     return f"""## The width in G is squared twice
 
 `calcLightSpecular` in `lightSpecularGGX` sets `roughness` to (1 - gloss)^2, which is the alpha of GGX, and `alpha` to
-its square. D is right: it takes `alpha` for alpha^2. G takes `alpha2 = alpha * alpha`, alpha^4, so that it masks as a
-surface of width alpha^2 would, which is smoother. With alpha^4 the formula D V cos gives the shader's values within
-{last["own_off"]:.0e} for 2,000 random pairs at gloss 0.3, in which all cosines are 0.05 or more; with alpha^2, as in
-Heitz2014, they differ by up to {last["meant_off"]:.0%}, and the shader is {last["meant_mean"] - 1.0:.0%} brighter on
-average. White metal of gloss 0.3 returns {last["grazing"]:.2f} at n.v 0.05 and {last["normal"]:.2f} at n.v 1; with
-alpha^2 in G it would return {last["meant_grazing"]:.2f} and {last["meant_normal"]:.2f}.
-Remedy: `alpha` in place of `alpha2` in the two roots. The WGSL chunk of the same name has the same lines, and
-`lightSpecularAnisoGGX` takes its widths right.
+its square. D is correct: it uses `alpha` as alpha^2. G uses `alpha2 = alpha * alpha`, that is, alpha^4, so that the
+masking is that of a smoother surface, of width alpha^2. With alpha^4, the formula D V cos gives the shader's values
+within {last["own_off"]:.0e} for 2,000 random pairs at gloss 0.3, in which all cosines are 0.05 or more; with alpha^2,
+as in Heitz2014, they differ by up to {last["meant_off"]:.0%}, and the shader is {last["meant_mean"] - 1.0:.0%} brighter
+on average. White metal of gloss 0.3 returns {last["grazing"]:.2f} at n.v 0.05 and {last["normal"]:.2f} at n.v 1; with
+alpha^2 in G, it would return {last["meant_grazing"]:.2f} and {last["meant_normal"]:.2f}.
+Remedy: use `alpha` instead of `alpha2` in the two square roots. The WGSL chunk of the same name has the same lines;
+`lightSpecularAnisoGGX` uses its widths correctly.
 
 ## Gloss beside the diffuse lobe
 
-`getLightDiffuse` is the cosine, without 1 / pi, while D contains 1 / pi. Under one lamp of intensity 1 white paper
-returns {last["paper"]:.3f}, and white metal about 1, so that gloss is pi times as weak beside a diffuse lobe as in
-glTF's reference. If this is a choice of units, the two lobes need the same."""
+`getLightDiffuse` is the cosine without the factor 1 / pi, whereas D contains 1 / pi. Under one light of intensity 1, a
+white dielectric returns {last["paper"]:.3f} and white metal about 1. Relative to the diffuse lobe, the specular lobe
+is therefore weaker than in glTF's reference by a factor of pi. If this is a choice of units, both lobes need the same
+units."""
 
 
 CAUSES = {
-    ("playcanvas-standard", "energy"): "G of a smoother surface: see the width in G.",
-    ("playcanvas-sheen", "energy"): "`combineColor` scales the base by 1 - 0.157 of the sheen's color at all angles, "
-    "while the lobe D V of white sheen alone reflects {sheen_25:.2f} at width 0.25 and n.v 0.05 ({sheen_100:.2f} at "
-    "width 1). The base gains as above.",
+    ("playcanvas-standard", "energy"): "G is that of a smoother surface: see the width in G above.",
+    ("playcanvas-sheen", "energy"): "`combineColor` scales the base by 1 - 0.157 times the color of the sheen at "
+    "all angles, whereas the lobe D V of white sheen alone reflects {sheen_25:.2f} at width 0.25 and n.v 0.05 "
+    "({sheen_100:.2f} at width 1). In addition, the base gains light as above.",
     ("playcanvas-sheen", "precision"): "`NoH2 * (alpha - 1.0) + 1.0` in the lobe of the base is the difference of two "
-    "numbers near 1 at the center of a narrow lobe; at gloss 1 `alpha` is 1e-6. Remedy: 1 - NoH^2 as the squared "
-    "length of cross(n, h), as in Filament.",
+    "numbers close to 1 at the center of a narrow lobe; at gloss 1, `alpha` is 1e-6. Remedy: compute 1 - NoH^2 as the "
+    "squared length of cross(n, h), as in Filament.",
 }
 
 ENGINE = Engine(
@@ -94,19 +95,21 @@ ENGINE = Engine(
             "White dielectric, lamp of 1 / pi",
             "playcanvas-standard",
             lambda r: {"rough": r, "metal": 0.0, "lamp": PAPER},
+            "White dielectric, light of intensity 1 / pi",
         ),
         Furnace("White metal, anisotropy 0.7", "playcanvas-anisotropic", lambda r: {"rough": r, "strength": 0.7}),
         Furnace(
             "White dielectric, white sheen of this roughness, lamp of 1 / pi",
             "playcanvas-sheen",
             lambda r: {"rough": 0.5, "metal": 0.0, "sheenRough": r, "lamp": PAPER},
+            "White dielectric with white sheen, light of intensity 1 / pi; roughness of the sheen varies",
         ),
     ),
     remarks={
-        "White metal": "See the width in G. At roughness 1 both widths are the same, and the loss is that of single "
-        "scattering.",
-        "White dielectric, lamp of 1 / pi": "Without area lights the diffuse lobe is not reduced by F; gloss adds to "
-        "it.",
+        "White metal": "See the width in G below. At roughness 1, both widths are the same, and the loss is that of "
+        "single scattering.",
+        "White dielectric, lamp of 1 / pi": "Without area lights, the diffuse lobe is not reduced by F, and the "
+        "specular lobe is added to it.",
     },
     trials=trials,
     sections=sections,

@@ -11,13 +11,13 @@ from gonio.catalog.shaders import files
 from . import three_builds
 from .base import Engine, Furnace, asymmetry, furnace, material, single_scattering
 
-INTRO = """MeshStandardMaterial and MeshPhysicalMaterial of WebGLRenderer under directional lights: the package's own
-fragment program, `ShaderLib/meshphysical.glsl.js`, for a flat surface without maps, with the defines that
-WebGLRenderer sets. The two releases are the last before and the newest after
+INTRO = """This card tests MeshStandardMaterial and MeshPhysicalMaterial of WebGLRenderer under directional lights. It
+runs the package's own fragment program, `ShaderLib/meshphysical.glsl.js`, for a flat surface without texture maps, with
+the defines that WebGLRenderer sets. The two releases tested are the last one before and the newest one after
 [#33983](https://github.com/mrdoob/three.js/pull/33983), which replaced the compensation of rough metals. Light from an
-environment map takes another path (`RE_IndirectSpecular_Physical`) and is not judged here. The materials
-three-tsl-... are those of WebGPURenderer, MeshStandardNodeMaterial and MeshPhysicalNodeMaterial: the WGSL that the
-package's TSL build hands to the device, [compared below](#tsl-against-webgl) with the GLSL."""
+environment map follows a different code path (`RE_IndirectSpecular_Physical`) and is not tested here. The materials
+three-tsl-... are those of WebGPURenderer, MeshStandardNodeMaterial and MeshPhysicalNodeMaterial. They run the WGSL that
+the package's TSL build passes to the device; the two builds are [compared below](#tsl-against-webgl)."""
 
 THREAD = {(0.5, 0.5): (0.90, 1.00), (0.75, 0.5): (0.84, 1.00), (1.0, 0.5): (0.72, 0.94), (1.0, 1.0): (0.58, 0.89)}
 
@@ -107,8 +107,8 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     tables = "\n".join(
         f"| {title} | {after[name]:.3f} | {after[f'{name}_grazing']:.3f} |"
         for title, name in (
-            ("the package's, 16 x 16", "own"),
-            ("16 x 16, computed anew at the same texel centers", "centers_16"),
+            ("16 x 16, from the package", "own"),
+            ("16 x 16, recomputed at the same texel centers", "centers_16"),
             ("64 x 64", "centers_64"),
             ("256 x 256", "centers_256"),
             ("16 x 16, first and last texel at 0 and 1", "edges_16"),
@@ -120,80 +120,86 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
 |---|---|---|---|---|---|
 {listed}
 
-The thread's figures are confirmed in all four rows, by this reading of the shader and by WebGLRenderer itself (below).
-Before, `BRDF_GGX_Multiscatter` added a lobe scaled by the product of the losses of both directions. For roughness 1 at
-normal incidence single scattering returns {before["none"]:.3f}, and the lobe brings it to {before["own"]:.3f}:
-{(before["own"] - before["none"]) / (1 - before["none"]):.0%} of the loss. Equation 16 of Turquin, in {new}, divides by
-the energy of single scattering, so that only errors of the table are left.
+The thread's figures are confirmed in all four rows, both by Gonio's reading of the shader and by WebGLRenderer itself
+([below](#reproducing-these-results)). Before the change, `BRDF_GGX_Multiscatter` added a lobe scaled by the product of
+the losses of both directions. For roughness 1 at normal incidence, single scattering returns {before["none"]:.3f}, and
+the added lobe raises this to {before["own"]:.3f}, which recovers
+{(before["own"] - before["none"]) / (1 - before["none"]):.0%} of the loss. Equation 16 of Turquin, used in {new},
+divides by the energy of single scattering, so that only the errors of the table remain.
 
 ## The table clamps at its border texels
 
-`DFGLUTData.js` holds 16 x 16 texels, each computed at the center of its texel. `texture2D(dfgLUT, vec2(roughness,
-dotNV))` returns the last texel for every coordinate above 31/32. For roughness 1 at normal incidence it returns
-E = {after["texel"]:.4f}, which is right for the texel's center ({after["exact_texel"]:.4f}); the energy there is
-{after["exact_end"]:.4f}. Their quotient, {after["exact_end"] / after["texel"]:.3f}, is the albedo of white metal. The
-same happens below 1/32 toward grazing angles, with the opposite sign. White metal with other tables in the same
-program:
+`DFGLUTData.js` contains 16 x 16 texels, each computed at its center. `texture2D(dfgLUT, vec2(roughness,
+dotNV))` returns the last texel for every coordinate above 31/32. For roughness 1 at normal incidence, it returns
+E = {after["texel"]:.4f}, which is correct for the center of the texel ({after["exact_texel"]:.4f}), whereas the energy
+for roughness 1 at normal incidence is {after["exact_end"]:.4f}. The quotient,
+{after["exact_end"] / after["texel"]:.3f}, is the albedo of white metal. The same happens below 1/32 toward grazing
+angles, with the opposite sign. With other tables in the same program, the albedo of white metal is:
 
 | table | roughness 1, n.v 1 | roughness 0.5, n.v 0.02 |
 |---|---|---|
 {tables}
 
-Remedy at the same size: compute the texels at 0, 1/15, ... 1, and scale the coordinates by 15/16 plus 1/32, as
+Remedy at the same size: compute the texels at 0, 1/15, ... 1, scale the coordinates by 15/16 and add 1/32, as
 `LTC_Uv` in the same chunk does for its tables.
 
 {three_builds.section(old, before, new, after)}"""
 
 
 CAUSES = {
-    ("three-standard", "reciprocity"): "`multiScatteringCompensation` in `lights_fragment_begin` depends on n.v alone, "
-    "as in Turquin's equation 16, which gives up reciprocity for energy. Without it (E = 1 in the table) f(wo, wi) and "
-    "f(wi, wo) differ by {none_asymmetry:.0e} instead of {asymmetry:.2f}. It matters to path tracers, not to a "
-    "rasterizer.",
+    ("three-standard", "reciprocity"): "`multiScatteringCompensation` in `lights_fragment_begin` depends only on n.v, "
+    "as in Turquin's equation 16, which trades reciprocity for energy conservation. Without it (E = 1 in the table), "
+    "f(wo, wi) and f(wi, wo) differ by {none_asymmetry:.0e} instead of {asymmetry:.2f}. This matters for path tracers, "
+    "not for a rasterizer.",
     ("three-standard", "energy"): "The table's first texel is used for every n.v below 1/32: white metal of roughness "
-    "0.5 at n.v 0.02 returns {own_grazing:.3f}, with a table of 256 x 256 {centers_256_grazing:.3f}.",
-    ("three-standard", "energy", "0.185.1"): "With the table of 16 x 16 the added lobe is {own_grazing:.3f} - "
-    "{none_grazing:.3f} at roughness 0.5 and n.v 0.02; the sum passes 1 only beyond 89 degrees. The loss at all other "
-    "angles is the term itself (above).",
-    ("three-standard", "precision"): "`D_GGX` computes `dotNH^2 (a2 - 1) + 1`, which near the lobe's center is the "
-    "difference of two numbers near 1: at roughness 0.045 this formula alone is off by up to {cancellation:.1%} in "
-    "float32, with dotNH itself exact. Remedy: 1 - dotNH^2 as the squared length of cross(n, h), as in Filament.",
-    ("three-standard(metal=0)", "energy"): "Gloss over a white base: see the furnace of the white dielectric.",
-    ("three-standard(metal=0)", "reciprocity"): "As for metal; the factor is 1 + 0.04 (1 / E - 1).",
-    ("three-standard(metal=0)", "precision"): "As for metal.",
-    ("three-standard(metal=0)", "linearity", "0.185.1"): "As for metal.",
+    "0.5 returns {own_grazing:.3f} at n.v 0.02, compared with {centers_256_grazing:.3f} for a table of 256 x 256 "
+    "texels.",
+    ("three-standard", "energy", "0.185.1"): "With the 16 x 16 table, the added lobe is {own_grazing:.3f} - "
+    "{none_grazing:.3f} at roughness 0.5 and n.v 0.02; the sum exceeds 1 only beyond 89 degrees. The loss at all other "
+    "angles is due to the term itself (see above).",
+    ("three-standard", "precision"): "`D_GGX` computes `dotNH^2 (a2 - 1) + 1`, which is the difference of two "
+    "numbers close to 1 near the center of the lobe: at roughness 0.045, this formula alone has errors of up to "
+    "{cancellation:.1%} in float32, even if dotNH is exact. Remedy: compute 1 - dotNH^2 as the squared length of "
+    "cross(n, h), as in Filament.",
+    ("three-standard(metal=0)", "energy"): "A specular lobe is added over a white base; see the white-furnace results "
+    "for the white dielectric.",
+    ("three-standard(metal=0)", "reciprocity"): "Same as for metal; the factor is 1 + 0.04 (1 / E - 1).",
+    ("three-standard(metal=0)", "precision"): "Same as for metal.",
+    ("three-standard(metal=0)", "linearity", "0.185.1"): "Same as for metal.",
     (
         "three-standard(metal=0)",
         "linearity",
-    ): "Between metal and dielectric the mixed F0 is multiplied by 1 + F0 (1 / E - 1), "
-    "so that the color enters by its square while the diffuse lobe loses it. The size is invisible.",
-    ("three-standard", "linearity"): "`BRDF_GGX_Multiscatter` multiplies FssEss of both directions and Favg, so that "
-    "the color enters by its third power alone. The size is invisible.",
-    ("three-physical", "reciprocity"): "As for the standard material; with clear coat the base is scaled by "
-    "1 - clearcoat F(n.v) at the end of `meshphysical`, which depends on the view alone.",
-    ("three-physical", "energy"): "Sheen and gloss over a white base. `IBLSheenBRDF` is the albedo by which "
-    "`RE_Direct_Physical` reduces the base: at sheen roughness 0.25 and n.v 0.05 the base is reduced by "
-    "{sheen_taken_25:.2f}, while the lobe D_Charlie V_Neubelt reflects {sheen_25:.2f}; at 0.1 it is "
-    "{sheen_taken_10:.2f} and {sheen_10:.2f}, so that the lobe alone gains. Gloss: see below the furnace of the white "
-    "dielectric.",
-    ("three-anisotropic", "reciprocity"): "As for the standard material.",
+    ): "Between metal and dielectric, the mixed F0 is multiplied by 1 + F0 (1 / E - 1), "
+    "so that the color enters squared while its share in the diffuse lobe decreases. An error of this size is "
+    "invisible.",
+    ("three-standard", "linearity"): "`BRDF_GGX_Multiscatter` multiplies FssEss of both directions by Favg, so that "
+    "the color enters only as its third power. An error of this size is invisible.",
+    ("three-physical", "reciprocity"): "Same as for the standard material; with a clear coat, the base is also scaled "
+    "by 1 - clearcoat F(n.v) at the end of `meshphysical`, which depends only on the view direction.",
+    ("three-physical", "energy"): "Sheen and a specular lobe are added over a white base. `IBLSheenBRDF` is the albedo "
+    "by which `RE_Direct_Physical` reduces the base: at sheen roughness 0.25 and n.v 0.05, the base is reduced by "
+    "{sheen_taken_25:.2f}, whereas the lobe D_Charlie V_Neubelt reflects {sheen_25:.2f}; at sheen roughness 0.1, the "
+    "values are {sheen_taken_10:.2f} and {sheen_10:.2f}, so that the sheen lobe alone gains light. For the specular "
+    "lobe, see the white-furnace results for the white dielectric.",
+    ("three-anisotropic", "reciprocity"): "Same as for the standard material.",
     (
         "three-anisotropic",
         "energy",
-    ): "As for the standard material. The loss of up to a fifth at high anisotropy is not "
-    "a violation: the table is read at `roughness`, which is the narrower of the two widths (`alphaT` is larger).",
+    ): "Same as for the standard material. The loss of up to a fifth at high anisotropy is not "
+    "a violation: the table is read at `roughness`, which is the smaller of the two widths (`alphaT` is larger).",
     ("three-iridescent", "positivity"): "`Fresnel0ToIor` takes the square root of a base reflectance "
-    "of 0, and the film's phase has a square root at grazing incidence. No value is wrong.",
-    ("three-iridescent", "reciprocity"): "As for the standard material; besides, `evalIridescence` is called with "
-    "n.v instead of v.h, once for all lights, also in 0.185.1.",
-    ("three-iridescent", "energy"): "As for the standard material.",
-    ("three-iridescent", "linearity"): "By nature: the reflectance of a film is not linear in that of its base.",
-    ("three-iridescent", "precision"): "As for the standard material.",
+    "of 0, and the phase of the film involves a square root at grazing incidence. No value is wrong.",
+    ("three-iridescent", "reciprocity"): "Same as for the standard material; in addition, `evalIridescence` is called "
+    "with n.v instead of v.h, once for all lights, in 0.185.1 as well.",
+    ("three-iridescent", "energy"): "Same as for the standard material.",
+    ("three-iridescent", "linearity"): "This is inherent in the model: the reflectance of a film is not linear in "
+    "that of its base.",
+    ("three-iridescent", "precision"): "Same as for the standard material.",
 }
 
 TSL = ("three-tsl-standard", "three-tsl-physical", "three-tsl-anisotropic", "three-tsl-iridescent")
 CAUSES |= {
-    (name, law): f"As for `{name.replace('-tsl', '')}`."
+    (name, law): f"Same as for `{name.replace('-tsl', '')}`."
     for name in TSL
     for law in ("positivity", "reciprocity", "energy", "linearity", "precision")
 } | {
@@ -201,7 +207,7 @@ CAUSES |= {
         "three-tsl-physical",
         "energy",
         "0.185.1",
-    ): "As for `three-physical`; besides, `V_Neubelt` is not limited to 1: see [above](#tsl-against-webgl).",
+    ): "Same as for `three-physical`; in addition, `V_Neubelt` is not limited to 1: see [above](#tsl-against-webgl).",
 }
 
 ENGINE = Engine(
@@ -227,11 +233,13 @@ ENGINE = Engine(
             "White dielectric, clear coat of this roughness",
             "three-physical",
             lambda r: {"rough": 0.5, "coat": 1.0, "coatRoughness": r},
+            "White dielectric with a clear coat; roughness of the coat varies",
         ),
         Furnace(
             "White dielectric, white sheen of this roughness",
             "three-physical",
             lambda r: {"rough": 0.5, "sheen": 1.0, "sheenWidth": r},
+            "White dielectric with white sheen; roughness of the sheen varies",
         ),
         Furnace(
             "White dielectric, coat and sheen",
@@ -245,21 +253,24 @@ ENGINE = Engine(
         ),
     ),
     remarks={
-        "White dielectric": "`RE_Direct_Physical` leaves to the diffuse lobe 1 - F(v.h) of each light. At grazing "
-        "angles most lights have a large v.h and a small F, while the sum of all lights reflects far more: at "
-        "roughness 0.1 and n.v 0.05 gloss alone returns {gloss:.2f}, and the diffuse lobe keeps {gloss_diffuse:.2f}. "
-        "`RE_IndirectDiffuse_Physical` in the same chunk uses 1 minus the albedo of the specular lobe instead. 0.185.1 "
-        "does not reduce the diffuse lobe of direct light at all.",
-        "White, half metal": "F0 is mixed before the compensation, 1 + F0 (1 / E - 1), which is meant for one F0; "
-        "`RE_IndirectSpecular_Physical` compensates metal and dielectric apart and then mixes them.",
-        "White metal, anisotropy 0.7": "The table is read at `roughness`, while the lobe is wider along the tangent.",
-        "White dielectric, clear coat of this roughness": "The base is scaled by 1 - F(n.v) of a smooth coat, while a "
-        "rough coat reflects less than that at grazing angles.",
-        "White dielectric, coat and sheen": "Coat and sheen have this roughness, the base has 0.5.",
+        "White dielectric": "`RE_Direct_Physical` scales the diffuse lobe by 1 - F(v.h) for each light. At grazing "
+        "view angles, v.h is large and F small for most light directions, although the specular lobe reflects far more "
+        "than this F suggests: at roughness 0.1 and n.v 0.05, the specular lobe alone returns {gloss:.2f}, and the "
+        "diffuse lobe still returns {gloss_diffuse:.2f}. `RE_IndirectDiffuse_Physical` in the same chunk instead uses "
+        "1 minus the albedo of the specular lobe. Release 0.185.1 does not reduce the diffuse lobe of direct light at "
+        "all.",
+        "White, half metal": "F0 is mixed before the compensation factor, 1 + F0 (1 / E - 1), is applied, although "
+        "this factor is meant for a single F0; `RE_IndirectSpecular_Physical` compensates metal and dielectric "
+        "separately and then mixes them.",
+        "White metal, anisotropy 0.7": "The table is read at `roughness`, whereas the lobe is wider along the tangent.",
+        "White dielectric, clear coat of this roughness": "The base is scaled by 1 - F(n.v) of a smooth coat, whereas "
+        "a rough coat reflects less light than that at grazing angles.",
+        "White dielectric, coat and sheen": "The roughness in the table is that of the coat and the sheen; the "
+        "base has roughness 0.5.",
         "White dielectric, coat and sheen, TSL": "The coat does not attenuate the sheen: see "
         "[below](#tsl-against-webgl).",
         "White dielectric, white sheen of this roughness": "`IBLSheenBRDF` is smaller than the albedo of the lobe at "
-        "low sheen roughness and grazing angles: see *energy* below.",
+        "low sheen roughness and grazing angles; see *energy* below.",
     },
     trials=trials,
     sections=sections,

@@ -41,19 +41,19 @@ BUILDS = (
         "standard",
         "standard",
         {},
-        "`BRDF_GGX_Multiscatter` divides by a term with `Favg` in GLSL, with its square in TSL",
+        "`BRDF_GGX_Multiscatter` divides by a term with `Favg` in GLSL, and with its square in TSL",
         ((_LIGHTS, r"Favg(?= \+ EPS)", "Favg * Favg"),),
     ),
-    Build("physical", "physical", "physical", {"index": 1.4}, "the same"),
+    Build("physical", "physical", "physical", {"index": 1.4}, "same as for the standard material"),
     Build(
         "weight",
         "physical, specularIntensity 0.5",
         "physical",
         {"specularWeight": 0.5},
-        "`PhysicalLightingModel.direct` passes 1 as F90, the GLSL `specularF90`",
+        "`PhysicalLightingModel.direct` passes 1 as F90, whereas the GLSL passes `specularF90`",
         ((_LIGHTS, r"material\.specularF90(?=;| \* dfg[VL])", "1.0"),),
     ),
-    Build("coat", "physical, clear coat", "physical", _COAT, "as for the standard material"),
+    Build("coat", "physical, clear coat", "physical", _COAT, "same as for the standard material"),
     Build(
         "sheen",
         "physical, sheen",
@@ -67,16 +67,16 @@ BUILDS = (
         "physical, clear coat and sheen",
         "physical",
         {**_COAT, **_SHEEN},
-        "`PhysicalLightingModel.finish` adds the sheen after the coat, `meshphysical` before it",
+        "`PhysicalLightingModel.finish` adds the sheen after the coat, whereas `meshphysical` adds it before",
         ((_PROGRAM, r" \+ sheenSpecular\w+(?=.*;)", ""), (_PROGRAM, "(?=#include <opaque)", _LAST)),
     ),
-    Build("anisotropic", "anisotropic", "anisotropic", {"strength": 0.6}, "as for the standard material"),
+    Build("anisotropic", "anisotropic", "anisotropic", {"strength": 0.6}, "same as for the standard material"),
     Build(
         "film",
         "iridescent",
         "iridescent",
         {"filmThickness": 500.0},
-        "`XYZ_TO_REC709` is transposed in TSL, until [#33984](https://github.com/mrdoob/three.js/pull/33984)",
+        "`XYZ_TO_REC709` was transposed in TSL before [#33984](https://github.com/mrdoob/three.js/pull/33984)",
         (("ShaderChunk/iridescence_fragment.glsl.js", r"XYZ_TO_REC709(?= \*)", "transpose( XYZ_TO_REC709 )"),),
     ),
 )
@@ -127,15 +127,16 @@ def section(old: str, before: dict[str, float], new: str, after: dict[str, float
     )
     return f"""## TSL against WebGL
 
-The largest relative difference of f of the two builds, of 4,000 pairs to 89 degrees, at base color 0.7, roughness 0.8
-and metalness 0.3; *equal* within 1e-5:
+The table gives the largest relative difference between the values of f in the two builds, over 4,000 pairs of
+directions up to 89 degrees, at base color 0.7, roughness 0.8 and metalness 0.3; *equal* means within 1e-5:
 
 | material | {old} | {new} | cause |
 |---|---|---|---|
 {rows}
 
-With these lines of the GLSL changed to what TSL has, all values agree within {before["tsl_left"]:.0e} and
-{after["tsl_left"]:.0e}. In {new} one difference is left. [KHR_materials_sheen](https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_materials_sheen)
-puts the clear coat on top of the sheen, as WebGLRenderer does. WebGPURenderer puts the sheen on top, where the coat
-does not attenuate it; the last two furnaces above differ most at grazing angles. Remedy: exchange the two blocks of
+With these lines of the GLSL changed to match TSL, all values agree within {before["tsl_left"]:.0e} in {old} and
+{after["tsl_left"]:.0e} in {new}. In {new}, one difference remains.
+[KHR_materials_sheen](https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_materials_sheen) puts
+the clear coat on top of the sheen, as WebGLRenderer does. WebGPURenderer puts the sheen on top, where the coat does not
+attenuate it; the last two furnaces above differ most at grazing angles. Remedy: exchange the two blocks of
 `PhysicalLightingModel.finish`."""

@@ -180,7 +180,7 @@ class EncodedUnderVarnish(RightDiffuse):
         (OneSidedCoupling, "reciprocity", "g(wo) / g(wi)"),
         (WrongScaling, "reciprocity", "eta^4 in transmission"),
         (OnePercentMore, "energy", "1.01 times the incident light"),
-        (MoreAtGrazing, "energy", "1.02 times that where wo's angle to the normal is beyond"),
+        (MoreAtGrazing, "energy", "1.02 times as much where wo's angle to the normal is beyond"),
         (BlueGains, "energy", "blue is 1.2 times the other channels"),
         (AlbedoSquared, "linearity", "albedo^2"),
         (EncodedUnderVarnish, "linearity", "albedo^2.2, within"),
@@ -275,7 +275,7 @@ def test_light_that_no_sample_finds_is_placed() -> None:
 @pytest.mark.slow
 def test_a_cascade_names_its_first_cause_once() -> None:
     report = verify(NoJacobianInSample(), quick=True, law=["energy", "weight"])
-    assert "(o.m)" in report["weight"].cause and report["energy"].cause == "follows from WEIGHT's"
+    assert "(o.m)" in report["weight"].cause and report["energy"].cause == "follows from the failure of weight"
     text = str(report)
     assert text.index("weight: ") < text.index("energy: directional")
 

@@ -283,4 +283,4 @@ def rejected(error: Exception, name: str) -> InputError:
     if "not found" in text and ("Plugin" in text or "plugin" in text):
         return InputError(f"Mitsuba has no plugin '{name}'", f"mitsuba:{name}", did_you_mean(name, plugins()))
     # Mitsuba prefixes source lines and the object's description; the last sentence states the problem
-    return InputError(f"Mitsuba rejects it: {text[-200:] if len(text) > 200 else text}", f"mitsuba:{name}")
+    return InputError(f"Mitsuba rejects it: {'...' + text[-200:] if len(text) > 200 else text}", f"mitsuba:{name}")

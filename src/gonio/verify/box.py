@@ -173,19 +173,34 @@ def _choices(subject: Subject) -> list[dict[str, str | bool]]:
 
 
 def covered(subject: Subject, tried: list[Place]) -> str:
-    """A sentence that lists the tested parameter values."""
+    """A sentence without a capital letter and a period that lists the tested parameter values."""
     if not tried:
-        return "judged at the given values only" + ("" if axes(subject) else ": no parameter declares a range")
+        reason = "" if axes(subject) else ", because no parameter declares a range"
+        return f"tested at the given parameter values only{reason}"
     kinds = Counter(place.why for place in tried)
-    words = ", ".join(f"{count} {_PLURAL[why] if count > 1 else why}" for why, count in sorted(kinds.items()))
-    ranges = ", ".join(f"{axis.path} {axis.low:g} to {axis.high:.4g}" for axis in axes(subject))
-    named = "; ".join(place.words for place in tried if place.why == "choice")
-    ranges = ", with ".join(filter(None, [ranges and f" of {ranges}", named])).lstrip()
-    return f"judged at the given values and {len(tried)} others ({words}) {ranges}"
+    words = {why: f"{count} {_NAMES[why][count > 1]}" for why, count in kinds.items()}
+    in_ranges = _listed([words.pop(why) for why in _IN_RANGES if why in words])
+    groups = [words[why] for why in _NAMES if why in words]
+    if in_ranges:  # discontinuities come last
+        groups.insert(len(groups) - ("jump" in words), f"{in_ranges} of the parameter ranges")
+    others = f"{len(tried)} other{'s' if len(tried) > 1 else ''} ({_listed(groups, ', and ')})"
+    ranges = _listed([f"{axis.path} from {axis.low:g} to {axis.high:.4g}" for axis in axes(subject)])
+    choices = " or ".join(place.words for place in tried if place.why == "choice")
+    along = ", and with ".join(filter(None, [ranges, choices]))
+    return f"tested at the given parameter values and at {others}, with {along}"
 
 
-_PLURAL = {"choice": "choices", "color": "colors", "corner": "corners", "edge": "edges", "interior": "inside"}
-_PLURAL |= {"jump": "jumps", "pair": "unequal widths"}
+def _listed(words: list[str], last: str = " and ") -> str:
+    """ "a, b and c", with the given text before the last one."""
+    return last.join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+
+
+# singular and plural, in the order of a sentence
+_NAMES = {"choice": ("other choice", "other choices"), "color": ("set of colors", "sets of colors")}
+_NAMES |= {"pair": ("pair of unequal widths", "pairs of unequal widths"), "corner": ("corner", "corners")}
+_NAMES |= {"edge": ("edge", "edges"), "interior": ("interior point", "interior points")}
+_NAMES |= {"jump": ("point at a discontinuity", "points at discontinuities")}
+_IN_RANGES = ("corner", "edge", "interior")
 
 
 def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis, ...]) -> Place | None:

@@ -77,10 +77,10 @@ def page(report: Report) -> str:
         word = f"{word if broken else 'No law is violated'}; not tried: {', '.join(report.untried)}"
         kind = kind if broken else "declared"
     tests = (
-        f"{report.tests} statistical tests at {report.threshold:.2e} each, one false alarm in a hundred reports; "
-        "a rejection is confirmed with a second seed."
+        f"{report.tests} statistical tests at significance {report.threshold:.2e} each (0.01 overall, Sidak "
+        "correction); a rejection counts only if a second seed confirms it."
         if report.tests
-        else "No statistical test."
+        else "No statistical tests."
     )
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8>",

@@ -56,12 +56,19 @@ class Quality:
     @property
     def texts(self) -> tuple[str, str, str, str]:
         """The four measures as text; "" for one that is None."""
+        failed, variance, cosine, ideal = self.numbers
         return (
-            f"{100.0 * self.failed:.2g} % of samples lost",
-            f"variance {_short(self.variance)}",
-            "" if self.cosine is None else f"{_short(self.cosine)} x as efficient as cosine sampling",
-            f"{100.0 * self.ideal:.3g} % of the ideal",
+            f"{failed} of samples lost",
+            f"variance {variance}",
+            cosine and f"{cosine} times as efficient as cosine sampling",
+            f"{ideal} of the ideal efficiency",
         )
+
+    @property
+    def numbers(self) -> tuple[str, str, str, str]:
+        """The four measures as numbers with their units; "" for one that is None."""
+        cosine = "" if self.cosine is None else _short(self.cosine)
+        return f"{100.0 * self.failed:.2g} %", _short(self.variance), cosine, f"{100.0 * self.ideal:.3g} %"
 
 
 def _short(value: float) -> str:

@@ -302,7 +302,7 @@ def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[V
         if len(failed) == 3:
             break
     if len(failed) > 1:
-        answer.notes.append(f"fails also at {'; '.join(asked.place.words for asked in failed[1:])}")
+        answer.notes.append(f"also fails at {'; '.join(asked.place.words for asked in failed[1:])}")
     answer.places = len(all_)
     answer.seconds += sum(asked.seconds for asked in all_ if asked is not where)
     return answer, where
@@ -338,7 +338,7 @@ def decide(
             break  # three confirmed rejections are enough
         trial.second = trial.repeat()
         if trial.second < CONFIRMATION:
-            statistical.append(f"{trial.where}: p = {trial.p:.2g}, and with a second seed {trial.second:.2g}")
+            statistical.append(f"{trial.where}: p = {trial.p:.2g}, and {trial.second:.2g} with a second seed")
         else:
             text = f"{trial.where}: p = {trial.p:.2g} is due to chance: {trial.second:.2g} with a second seed"
             finding.notes.append(text)

@@ -91,7 +91,7 @@ class Bias:
     def words(self) -> str:
         """The bias as text: "loses 4.8 % of the reflected light on average, 12 % at worst (wo at 85 degrees), ..."."""
         if self.kind == "noise":
-            return f"it costs samples and biases nothing: {self.where}"
+            return f"samples are wasted, but nothing is biased: {self.where}"
         if self.kind == "interface":
             return f"pictures of a plain path tracer do not change: {self.where}"
         if self.kind == "derivatives" and not self.average:

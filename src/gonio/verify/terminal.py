@@ -48,7 +48,7 @@ def show_card(card: Card, console: Console) -> None:
             _explain(v, console)
     if same:
         laws = ", ".join(v.law for v in same)
-        console.print(f"[bold red]{escape(laws)}[/]: the same exception, {escape(same[0].cause)}\n")
+        console.print(f"[bold red]{escape(laws)}[/]: the same exception ({escape(same[0].cause)})\n")
 
 
 def _mark(verdict: Verdict) -> str:

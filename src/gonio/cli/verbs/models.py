@@ -74,9 +74,8 @@ def _qualities(as_json: bool) -> None:
     if as_json:
         print(json.dumps({name: one and {"of": title, **one.as_dict()} for name, (title, one) in qualities.items()}))
         return
-    table = listing("material", "judged as", "fails", "variance of the weight", "against cosine", "of the ideal")
+    heads = ("failed samples", "variance of the weight", "relative to cosine sampling", "of the ideal")
+    table = listing("material", "tested as", *heads)
     for name, (title, one) in qualities.items():
-        texts = one.texts if one else ("no light",) * 4
-        words = (" fail", "variance ", " cosine sampling", " of the ideal")
-        table.add_row(name, title, *(text.replace(word, "") or "-" for text, word in zip(texts, words, strict=True)))
+        table.add_row(name, title, *(text or "-" for text in (one.numbers if one else ("no light",) * 4)))
     print_rich(table)

@@ -49,7 +49,7 @@ class Calls(Law):
         finding.notes.append(f"checked: {', '.join(dict.fromkeys(checked))}")
         finding.figure = float(len(finding.problems))
         if finding.problems:
-            finding.shown = f"{len(finding.problems)} differ"
+            finding.shown = f"{len(finding.problems)} differ{'s' if len(finding.problems) == 1 else ''}"
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
@@ -170,7 +170,7 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
     def some(rows: Any, answers: dict[str, np.ndarray] = first) -> dict[str, np.ndarray]:
         return {name: value[rows] for name, value in answers.items()}
 
-    twice = _unlike("asked twice", first, second, wo, wi, 0.0)
+    twice = _unlike("the same call twice", first, second, wo, wi, 0.0)
     if twice.wrong:
         yield twice._replace(wrong=f"{twice.wrong}: declare `stochastic = True` if its values are random")
         return

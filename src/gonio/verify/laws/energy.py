@@ -177,7 +177,7 @@ class Energy(Law):
         # a sharp edge, not a gradual rise
         if place and np.abs(a[bad] - 1.0).min() > 0.1 * np.abs(a[bad] - 1.0).max():
             words = f"{place.replace('from wi', 'from wo')}"
-            yield Cause(f"it reflects all incident light, but {np.median(a[bad]):.4g} times that {words}", words)
+            yield Cause(f"it reflects all incident light, but {np.median(a[bad]):.4g} times as much {words}", words)
 
     def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
         """Check that the closed form of a material's albedo equals the integral of `eval`."""

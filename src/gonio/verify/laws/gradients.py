@@ -82,7 +82,7 @@ class Gradients(Law):
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             problems=problems,
-            notes=[f"tried: {', '.join(tried)}; {skipped:.2%} of the pairs lie on edges"],
+            notes=[f"tried: {', '.join(tried)}; {100.0 * skipped:.2f} % of the pairs lie on edges"],
         )
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Bias:

@@ -43,7 +43,11 @@ class Positivity(Law):
             figure=0.0,
             tolerance=0.0,
             reason="none is allowed",
-            notes=[f"{len(variants)} settings: the given one and the ends of each range"],
+            notes=[
+                f"{len(variants)} settings: the given one and the ends of each range"
+                if len(variants) > 1
+                else "only the given setting"
+            ],
         )
         declared = "positivity" in subject.breaches  # measured noise around 0: relative to the largest value
         checked = 0
