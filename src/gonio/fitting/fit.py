@@ -246,6 +246,8 @@ def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], 
     data = problem.data.some(FEW)
     few = _with_data(problem, data, problem.name)
     rough = _with_data(problem, data, "log") if problem.name == "relative" else few
+    if problem.tabulated:  # each step computes a set of tables
+        starts = sorted(starts, key=few.cost)[:SOLVED]
     begins: list[Floats] = []
     for start in starts:
         end = solve(rough, start, steps=12, tolerance=1e-3).numbers
