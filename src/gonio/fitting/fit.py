@@ -30,7 +30,7 @@ from .models import modelled as modelled
 from .models import moving_of as moving_of
 from .models import moving_with_notes
 from .parameters import NAMES, Free, ranges, with_values
-from .profiles import profiles
+from .profiles import LARGE, profiles
 from .solver import METRICS, Problem, Solution, solve
 from .starts import between, starts_of
 
@@ -303,7 +303,8 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
     relative = float(np.abs(value - data.value).mean() / max(float(np.abs(data.value).mean()), 1e-30))
     mean = cost / max(3 * len(data), 1)
     degrees = degrees_of_freedom(parts, data.row, sure.inverse)
-    ends = profiles(problem, numbers, cost, sure, quantiles(degrees), mean, 3 * len(data))
+    large = problem.tabulated or 3 * len(data) * len(numbers) > LARGE
+    ends = profiles(problem, numbers, cost, sure, quantiles(degrees), mean, large)
     unknown = ~(np.isfinite(sure.errors) | np.isfinite(ends).all(axis=1))
     told = notes_on(problem.free, numbers, unknown, sure.coupling, names, sure.undetermined)
     return Fit(
