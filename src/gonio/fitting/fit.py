@@ -37,6 +37,7 @@ from .starts import between, starts_of
 FEW = 6000  # values on which starting points are compared
 SOME = 60_000  # values on which the best solutions are refined
 SOLVED = 8  # starting points that are refined with the metric itself on few values
+TABULATED = 4  # starting points of a material that computes tables in each step
 ENDS = 3  # solutions that are refined to convergence
 SAME = 1e-4  # relative difference of costs above which two solutions count as distinct
 INSIDE = (0.1, 0.5)  # fractions of a range to which numbers at its ends are moved
@@ -246,8 +247,8 @@ def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], 
     data = problem.data.some(FEW)
     few = _with_data(problem, data, problem.name)
     rough = _with_data(problem, data, "log") if problem.name == "relative" else few
-    if problem.tabulated:  # each step computes a set of tables
-        starts = sorted(starts, key=few.cost)[:SOLVED]
+    if problem.tabulated:
+        starts = sorted(starts, key=few.cost)[:TABULATED]
     begins: list[Floats] = []
     for start in starts:
         end = solve(rough, start, steps=12, tolerance=1e-3).numbers
