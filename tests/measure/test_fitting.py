@@ -217,6 +217,17 @@ def test_an_index_leaves_the_end_of_its_range_where_its_slope_is_0(seed: int) ->
     np.testing.assert_allclose(index, eta, atol=0.15)
 
 
+def test_the_width_of_a_base_under_a_coat_can_be_fitted() -> None:
+    fixed = {"base.eta": 1.2, "base.k": 3.0, "absorption": 0.0, "depth": 1.0}
+    material, moving = moving_of("coat(base=conductor,index=1.4,alpha=0.1)", 1, fixed)
+    assert [one.path for one in moving] == ["base.alpha"]
+    wo, wi = _listed(PLASTIC, 0.0, 3).pairs()
+    right = tree.replace(material, {"base.alpha": 0.4})
+    cells = data.Data(wo, wi, right.eval(wo, wi), np.zeros(len(wo), np.int64))
+    found = solver.solve(solver.Problem(material, moving, cells, "relative"), np.array([0.38]), steps=4)
+    assert found.numbers == pytest.approx(0.4, rel=2e-3)
+
+
 def test_arrays_of_pairs_can_be_fitted() -> None:
     listed = _listed(PLASTIC, 0.02, 3)
     wo, wi = listed.pairs()

@@ -53,7 +53,7 @@ class Wall:
 def test_ends_where_the_rise_is_that_of_the_quantile(high):
     """exp(x) - 1 = +-0.9 at log 0.1 and log 1.9: far from even, and the parabola would say +-0.9."""
     sure = Certainty(np.array([[0.81]]), [], np.array([[0.81]]))
-    ((low, up),) = profiles(Wall(high), np.zeros(1), 0.0, sure, np.array([0.9]), 1.0, 1)  # type: ignore[arg-type]
+    ((low, up),) = profiles(Wall(high), np.zeros(1), 0.0, sure, np.array([0.9]), 1.0, False)  # type: ignore[arg-type]
     assert low == pytest.approx(np.log(0.1), rel=0.02)
     assert up == pytest.approx(min(np.log(1.9), high), rel=0.02)
 
@@ -74,11 +74,11 @@ def test_the_text_of_a_fit_states_intervals():
 def test_an_exact_fit_has_no_profile():
     """Its residuals are rounding, in which the search for a rise of that size would not end."""
     sure = Certainty(np.array([[0.81]]), [], np.array([[0.81]]))
-    assert np.isnan(profiles(Wall(50.0), np.zeros(1), 0.0, sure, np.array([0.9]), 1e-8, 1)).all()  # type: ignore[arg-type]
+    assert np.isnan(profiles(Wall(50.0), np.zeros(1), 0.0, sure, np.array([0.9]), 1e-8, False)).all()  # type: ignore[arg-type]
 
 
 def test_of_many_values_only_what_has_no_standard_error_is_profiled():
     for error, expected in ((0.9, np.nan), (np.inf, np.log(1.9))):
         sure = Certainty(np.array([[error**2]]), [], np.array([[0.81]]))
-        ends = profiles(Wall(50.0), np.zeros(1), 0.0, sure, np.array([0.9]), 1.0, 10**7)  # type: ignore[arg-type]
+        ends = profiles(Wall(50.0), np.zeros(1), 0.0, sure, np.array([0.9]), 1.0, True)  # type: ignore[arg-type]
         assert ends[0, 1] == pytest.approx(expected, rel=0.02, nan_ok=True)

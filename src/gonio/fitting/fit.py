@@ -30,13 +30,14 @@ from .models import modelled as modelled
 from .models import moving_of as moving_of
 from .models import moving_with_notes
 from .parameters import NAMES, Free, ranges, with_values
-from .profiles import profiles
+from .profiles import LARGE, profiles
 from .solver import METRICS, Problem, Solution, solve
 from .starts import between, starts_of
 
 FEW = 6000  # values on which starting points are compared
 SOME = 60_000  # values on which the best solutions are refined
 SOLVED = 8  # starting points that are refined with the metric itself on few values
+TABULATED = 4  # starting points of a material that computes tables in each step
 ENDS = 3  # solutions that are refined to convergence
 SAME = 1e-4  # relative difference of costs above which two solutions count as distinct
 INSIDE = (0.1, 0.5)  # fractions of a range to which numbers at its ends are moved
@@ -246,6 +247,8 @@ def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], 
     data = problem.data.some(FEW)
     few = _with_data(problem, data, problem.name)
     rough = _with_data(problem, data, "log") if problem.name == "relative" else few
+    if problem.tabulated:
+        starts = sorted(starts, key=few.cost)[:TABULATED]
     begins: list[Floats] = []
     for start in starts:
         end = solve(rough, start, steps=12, tolerance=1e-3).numbers
@@ -301,7 +304,8 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
     relative = float(np.abs(value - data.value).mean() / max(float(np.abs(data.value).mean()), 1e-30))
     mean = cost / max(3 * len(data), 1)
     degrees = degrees_of_freedom(parts, data.row, sure.inverse)
-    ends = profiles(problem, numbers, cost, sure, quantiles(degrees), mean, 3 * len(data))
+    large = problem.tabulated or 3 * len(data) * len(numbers) > LARGE
+    ends = profiles(problem, numbers, cost, sure, quantiles(degrees), mean, large)
     unknown = ~(np.isfinite(sure.errors) | np.isfinite(ends).all(axis=1))
     told = notes_on(problem.free, numbers, unknown, sure.coupling, names, sure.undetermined)
     return Fit(

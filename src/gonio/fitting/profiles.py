@@ -42,7 +42,7 @@ class Costs(Residuals, Protocol):
 
 
 def profiles(
-    problem: Costs, numbers: Floats, cost: float, sure: Certainty, quantiles: Floats, scale: float, values: int
+    problem: Costs, numbers: Floats, cost: float, sure: Certainty, quantiles: Floats, scale: float, large: bool
 ) -> Floats:
     """Ends of the 95 % intervals of parameters for which value +- t error does not hold, (K, 2); NaN for the others.
 
@@ -53,7 +53,7 @@ def profiles(
     cost       its sum of squares
     sure       standard errors and the pseudoinverse of J^T J
     quantiles  quantiles of Student's distribution, (K,)
-    values     number of values that the problem explains
+    large      whether the problem is large: more than `LARGE` derivatives, or tables to compute in each step
     scale      mean squared residual, used as s if the data determine no parameter; otherwise, an undetermined parameter
                gets the median s
     """
@@ -71,7 +71,6 @@ def profiles(
             continue
         rise = quantiles[k] ** 2 * own[k]
         half = quantiles[k] * sure.errors[k]
-        large = values * len(numbers) > LARGE
         if not 0.0 < rise < np.inf or (known[k] and (large or _is_even(problem, numbers, k, half, sure.inverse, cost))):
             continue
         step = half if known[k] else FIRST * (numbers[k] if ratio[k] else _span(numbers[k], low[k], high[k]))

@@ -166,6 +166,11 @@ class Problem:
     def count(self) -> int:
         return sum(map(len, self.columns))
 
+    @property
+    def tabulated(self) -> bool:
+        """Whether the material computes tables from a parameter (`BSDF.fixed`), so that each step takes longer."""
+        return any(one.path in self.material.fixed for one in self.free)
+
     def _loaded(self, types: backend.Types) -> tuple[Array, Array, list[Array]]:
         if self._given is None:
             wo, wi = (backend.vector_of(w, 3, types) for w in (self.data.wo, self.data.wi))

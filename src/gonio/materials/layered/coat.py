@@ -86,11 +86,12 @@ class Coat(BSDF):
         name = type(self.base).__name__
         if self.base.transmits:
             raise InputError(f"{name} transmits, a material that only reflects expected", "Coat.base")
-        if self.base.delta == "maybe" or self.base.stochastic:
-            why = "is a mirror in places" if self.base.delta == "maybe" else "is random"
+        base = tree.plain_values(self.base)  # a width may be a Dr.Jit number, whose value no fact reads
+        if base.delta == "maybe" or base.stochastic:
+            why = "is a mirror in places" if base.delta == "maybe" else "is random"
             hint = "give it a width everywhere, or make all of it a mirror"
             raise InputError(f"{name} {why}, one finite lobe or one mirror expected", "Coat.base", hint)
-        if self._mirror and microfacet.delta_of(self.alpha) != "always":
+        if base.delta == "always" and microfacet.delta_of(self.alpha) != "always":
             hint = "a narrow base, alpha = 0.01, under a rough coat; or a smooth coat"
             raise InputError("a rough coat over a perfect mirror, which it would blur", "Coat.alpha", hint)
         fixed = self.fixed

@@ -155,14 +155,13 @@ def find(coat: Coated) -> LayerTables:
         columns = [face.reflected(outside), 0.0 * outside, 1.0 - face.reflected(outside), face.beyond(outside)]
         once = Table("coat_again", np.array([1.0, 0.0]).reshape(1, 1, 2))
         return LayerTables(Table("coat", np.stack(columns, -1)), None, once)
-    draws = _drawn(coat.base, index)
-    totally = (draws.weight * (draws.position <= 0.0)).sum(1) / np.maximum(draws.weight.sum(1), EPSILON)
+    draws = _drawn(coat.base, index, face)
     t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT - 1)
     colors = np.maximum(2.0 * t / (1.0 + t), 1e-4)
-    sums = [_series(draws, colors, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), MIN_LEFT)]
+    sums = [_series(draws, colors, u, face) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), MIN_LEFT)]
     rest, over_factor, norm = (_continued([one[n] for one in sums]) for n in range(3))
     # fraction sampled by a cosine: base samples that are totally reflected, and the rest
-    share = np.maximum(1.7 * np.interp(np.sqrt(outside), draws.place, totally), 0.7 * sums[-1].share)
+    share = np.maximum(1.7 * np.interp(np.sqrt(outside), draws.place, draws.totally), 0.7 * sums[-1].share)
     columns = [face.reflected(outside), np.clip(share, 0.05, 0.95), face.lobe(outside), face.beyond(outside)]
     return LayerTables(
         Table("coat", np.stack(columns, -1)),
@@ -175,21 +174,54 @@ class _Curve(Protocol):
     def __call__(self, cosine: Floats, /) -> Floats: ...
 
 
+class _Spread(NamedTuple):
+    """Samples of light inside the coat, each distributed to the two nodes next to its direction.
+
+    weight   weight of each sample, (rows, samples)
+    inverse  1 / cosine: the length of a crossing of the coat
+    cell     index of the lower of the two nodes in a matrix with a row for each row of samples
+    part     fraction of the weight that the upper one gets
+    """
+
+    weight: Floats
+    inverse: Floats
+    cell: Floats
+    part: Floats
+
+    @classmethod
+    def of(cls, weight: Floats, cosine: Floats, index: float) -> _Spread:
+        scaled = (_place_of(cosine, index) + 1.0) * HALF
+        low = np.minimum(scaled, 2 * HALF - EPSILON).astype(int)
+        return cls(weight, 1.0 / cosine, low + np.arange(len(weight))[:, None] * (2 * HALF + 1), scaled - low)
+
+    def left(self, u: float) -> Floats:
+        """The weights after a crossing of a coat with the transmittance u at normal incidence."""
+        return np.asarray(self.weight * u**self.inverse)
+
+    def matrix(self, weight: Floats) -> Floats:
+        """Weights of the samples, summed at the nodes, (rows, nodes)."""
+        count = 2 * HALF + 1
+        size = count * len(weight)
+        sums = np.bincount(self.cell.ravel(), (weight * (1.0 - self.part)).ravel(), size)
+        sums += np.bincount((self.cell + 1).ravel(), (weight * self.part).ravel(), size)
+        return np.asarray(sums, float).reshape(len(weight), count)
+
+
 class _Interface(NamedTuple):
     """The coat's surface.
 
     reflected  R from outside, as a function of the cosine outside
     out        T from inside, as a function of the position (`_places`)
     beyond     R without the facets' first reflection, scaled so that beyond(o) beyond(i) is the lobe of this light
-    entering   for `ROUGH` positions outside, weights, cosines and positions of samples inside; None if it is smooth
+    entering   samples inside for `ROUGH` positions outside; None if the surface is smooth
     returning  the same for positions inside, for the light that is reflected back
     """
 
     reflected: _Curve
     out: _Curve
     beyond: _Curve
-    entering: tuple[Floats, Floats, Floats] | None
-    returning: tuple[Floats, Floats, Floats] | None
+    entering: _Spread | None
+    returning: _Spread | None
 
     def lobe(self, x: Floats) -> Floats:
         """The transmittance for the base's lobe, per direction: the geometric mean of those inward and outward."""
@@ -238,8 +270,8 @@ def _interface(coat: Coated, index: float) -> _Interface:
         lambda cos: np.interp(np.sqrt(cos), fine, once + more * (scale > 0.0)),
         lambda p: np.interp(p, place, leaves),
         lambda cos: np.interp(np.sqrt(cos), fine, more * scale),
-        (goes_in, inside, _place_of(inside, index)),
-        (stays, returning_cosine, _place_of(returning_cosine, index)),
+        _Spread.of(goes_in, inside, index),
+        _Spread.of(stays, returning_cosine, index),
     )
 
 
@@ -271,23 +303,26 @@ def _place_of(cosine: Floats, index: float) -> Floats:
 class _Draws(NamedTuple):
     """Samples of the lossless base for light inside the coat.
 
-    place, mu           positions and cosines of the nodes
-    weight              weight of each sample at each node, (nodes, POINTS)
-    cosine, position    cosines and positions of the sampled directions
-    colors              black, the base's channels and white, in ascending order
-    share               factor on each sample's weight, for each of these colors
+    place, mu  positions and cosines of the nodes
+    samples    the samples at each node, (nodes, POINTS)
+    totally    fraction of the light from each node that is totally reflected
+    out        transmittance of the interface in the direction of each sample
+    crossing   the same for the base's lobe
+    colors     black, the base's channels and white, in ascending order
+    share      factor on each sample's weight, for each of these colors
     """
 
     place: Floats
     mu: Floats
-    weight: Floats
-    cosine: Floats
-    position: Floats
+    samples: _Spread
+    totally: Floats
+    out: Floats
+    crossing: Floats
     colors: Floats
     share: Floats
 
 
-def _drawn(base: BSDF, index: float) -> _Draws:
+def _drawn(base: BSDF, index: float, face: _Interface) -> _Draws:
     """Samples of the lossless base for light from the nodes' directions, over all azimuths. A base that is its own
     lossless variant is normalized to its brightest channel."""
     white = base.lossless()
@@ -311,7 +346,11 @@ def _drawn(base: BSDF, index: float) -> _Draws:
     weight /= np.maximum(weight.sum(1, keepdims=True), 1.0)  # the series would diverge for a base that gains light
     cosine = np.clip(drawn.wi[:, 2], 1e-4, 1.0).reshape(len(mu), POINTS)
     share = share.reshape(-1, len(mu), POINTS)
-    return _Draws(place, mu, weight, cosine, _place_of(cosine, index), colors, share)
+    position = _place_of(cosine, index)
+    totally = (weight * (position <= 0.0)).sum(1) / np.maximum(weight.sum(1), EPSILON)
+    out = np.where((position <= 0.0) & (face.entering is None), 0.0, face.out(position))
+    crossing = np.where(position > 0.0, face.lobe(np.maximum(position, 0.0) ** 2), 0.0)
+    return _Draws(place, mu, _Spread.of(weight, cosine, index), totally, out, crossing, colors, share)
 
 
 class _Sum(NamedTuple):
@@ -323,36 +362,27 @@ class _Sum(NamedTuple):
     share: Floats
 
 
-def _series(draws: _Draws, colors: Floats, u: float, face: _Interface, index: float) -> _Sum:
+def _series(draws: _Draws, colors: Floats, u: float, face: _Interface) -> _Sum:
     """The sum of the series at one u, divided into lobe and rest, for each color."""
-    n = len(draws.place)
-    out, t = face.out(draws.position), u ** (1.0 / draws.cosine)
-    out = np.where((draws.position <= 0.0) & (face.entering is None), 0.0, out)
+    n, samples = len(draws.place), draws.samples
+    t = u**samples.inverse
     x = np.linspace(0.0, 1.0, NODES) ** 2
     root = np.sqrt(x)
     through = u ** (1.0 / np.interp(root, draws.place, draws.mu))
-    crossing = np.where(draws.position > 0.0, face.lobe(np.maximum(draws.position, 0.0) ** 2), 0.0)
-    back = None
-    if face.returning is not None:
-        weight, cosine, place = face.returning
-        back = _onto(weight * u ** (1.0 / cosine), place, n)
+    back = None if face.returning is None else face.returning.matrix(face.returning.left(u))
     kinds = []
     for share in draws.share[1:]:  # black contributes nothing
-        weight = draws.weight * share
-        # a smooth interface reflects like a mirror
-        P = (
-            _onto(weight * (1.0 - out) * t**2, draws.position, n)
-            if back is None
-            else _onto(weight * t, draws.position, n) @ back
-        )
-        lobe = face.lobe(x) * through * np.interp(root, draws.place, (weight * crossing * t).sum(1))
-        kinds.append((P, (weight * out * t).sum(1), lobe))
+        weight = samples.weight * share
+        if back is None:  # a smooth interface reflects like a mirror
+            P = samples.matrix(weight * (1.0 - draws.out) * t**2)
+        else:
+            P = samples.matrix(weight * t) @ back
+        lobe = face.lobe(x) * through * np.interp(root, draws.place, (weight * draws.crossing * t).sum(1))
+        kinds.append((P, (weight * draws.out * t).sum(1), lobe))
     if face.entering is None:
         enters = _at_nodes(root, draws.place) * ((1.0 - face.reflected(x)) * through)[:, None]
     else:
-        weight, cosine, place = face.entering
-        rows = _onto(weight * u ** (1.0 / cosine), place, n)
-        enters = _at_nodes(root, np.linspace(0.0, 1.0, ROUGH)) @ rows
+        enters = _at_nodes(root, np.linspace(0.0, 1.0, ROUGH)) @ face.entering.matrix(face.entering.left(u))
     area = np.gradient(root) * 2.0 * root**3  # x dx
     judged = x > 1e-3  # both vanish at the horizon
     rests, factors, norms, share = [], [], [], 0.0 * x
@@ -379,17 +409,6 @@ def _series(draws: _Draws, colors: Floats, u: float, face: _Interface, index: fl
 def _continued(values: list[Floats]) -> Floats:
     """The values at each u, stacked along the last axis and extrapolated linearly by one node."""
     return np.stack([*values, 2.0 * values[-1] - values[-2]], -1)
-
-
-def _onto(weight: Floats, position: Floats, n: int) -> Floats:
-    """The weights of each row, distributed to the nodes adjacent to their positions from -1 to 1, (rows, n)."""
-    scaled = (position + 1.0) * (0.5 * (n - 1))
-    cell = np.minimum(scaled, n - 1 - EPSILON).astype(int)
-    part, row = scaled - cell, np.arange(len(weight))[:, None] * n
-    size = n * len(weight)
-    sums = np.bincount((row + cell).ravel(), (weight * (1.0 - part)).ravel(), size)
-    sums += np.bincount((row + cell + 1).ravel(), (weight * part).ravel(), size)
-    return np.asarray(sums, float).reshape(len(weight), n)
 
 
 def _at_nodes(x: Floats, nodes: Floats) -> Floats:
