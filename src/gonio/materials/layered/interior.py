@@ -29,10 +29,9 @@ from __future__ import annotations
 
 import functools
 from collections import OrderedDict
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import ops
 from ...energy.albedo.directional import albedo
@@ -41,23 +40,19 @@ from ...material import BSDF, tree
 from ...material.parameters import pair_of
 from ...ops import Direction, Spectrum, Table, backend
 from ...ops.backend import Array
-from ...optics import frame
 from ...optics.fresnel import exact
 from ...optics.lattice import r_sequence
 from ...optics.roughness import SMOOTH
 from ..compensated.kulla_conty import KullaConty
 from ..microfacet.dielectric import Dielectric
+from ._nodes import EPSILON, Floats, Spread, at_nodes, directions, place_of, places
 
-Floats: TypeAlias = "NDArray[np.floating]"
-
-HALF = 16  # steps of the directions that leave, and of those that are totally reflected
 POINTS = 1 << 13  # samples per node
 NODES = 97  # nodes of the tables, at equal steps of the square root of the cosine outside, like R at grazing angles
 ROUGH = 33  # nodes at which a rough interface is sampled
 COLOURS, LEFT = 13, 13  # steps of the color and of the transmittance u, see `colour_place` and `left_place`
 MIN_LEFT = 0.03  # the smallest u, the first step
 CACHE_SIZE = 32  # sets of tables in memory
-EPSILON = 1e-9
 
 
 class LayerTables(NamedTuple):
@@ -174,44 +169,11 @@ class _Curve(Protocol):
     def __call__(self, cosine: Floats, /) -> Floats: ...
 
 
-class _Spread(NamedTuple):
-    """Samples of light inside the coat, each distributed to the two nodes next to its direction.
-
-    weight   weight of each sample, (rows, samples)
-    inverse  1 / cosine: the length of a crossing of the coat
-    cell     index of the lower of the two nodes in a matrix with a row for each row of samples
-    part     fraction of the weight that the upper one gets
-    """
-
-    weight: Floats
-    inverse: Floats
-    cell: Floats
-    part: Floats
-
-    @classmethod
-    def of(cls, weight: Floats, cosine: Floats, index: float) -> _Spread:
-        scaled = (_place_of(cosine, index) + 1.0) * HALF
-        low = np.minimum(scaled, 2 * HALF - EPSILON).astype(int)
-        return cls(weight, 1.0 / cosine, low + np.arange(len(weight))[:, None] * (2 * HALF + 1), scaled - low)
-
-    def left(self, u: float) -> Floats:
-        """The weights after a crossing of a coat with the transmittance u at normal incidence."""
-        return np.asarray(self.weight * u**self.inverse)
-
-    def matrix(self, weight: Floats) -> Floats:
-        """Weights of the samples, summed at the nodes, (rows, nodes)."""
-        count = 2 * HALF + 1
-        size = count * len(weight)
-        sums = np.bincount(self.cell.ravel(), (weight * (1.0 - self.part)).ravel(), size)
-        sums += np.bincount((self.cell + 1).ravel(), (weight * self.part).ravel(), size)
-        return np.asarray(sums, float).reshape(len(weight), count)
-
-
 class _Interface(NamedTuple):
     """The coat's surface.
 
     reflected  R from outside, as a function of the cosine outside
-    out        T from inside, as a function of the position (`_places`)
+    out        T from inside, as a function of the position (`places`)
     beyond     R without the facets' first reflection, scaled so that beyond(o) beyond(i) is the lobe of this light
     entering   samples inside for `ROUGH` positions outside; None if the surface is smooth
     returning  the same for positions inside, for the light that is reflected back
@@ -220,8 +182,8 @@ class _Interface(NamedTuple):
     reflected: _Curve
     out: _Curve
     beyond: _Curve
-    entering: _Spread | None
-    returning: _Spread | None
+    entering: Spread | None
+    returning: Spread | None
 
     def lobe(self, x: Floats) -> Floats:
         """The transmittance for the base's lobe, per direction: the geometric mean of those inward and outward."""
@@ -243,7 +205,7 @@ def _interface(coat: Coated, index: float) -> _Interface:
     surface = KullaConty(glass)
     root = np.linspace(0.0, 1.0, ROUGH)
     lattice = r_sequence(POINTS, 4)
-    wo, u = _directions(np.maximum(root**2, 1e-4), lattice), np.tile(lattice[:, :3], (ROUGH, 1))
+    wo, u = directions(np.maximum(root**2, 1e-4), lattice), np.tile(lattice[:, :3], (ROUGH, 1))
     up = surface.sample(wo, u, "importance", "float64")
     weight = np.where(up.pdf > 0.0, up.weight.mean(1), 0.0).reshape(ROUGH, POINTS)
     weight /= weight.sum(1, keepdims=True)
@@ -251,8 +213,8 @@ def _interface(coat: Coated, index: float) -> _Interface:
     R = (weight * (cosine > 0.0)).sum(1)
     goes_in = np.where(cosine < 0.0, weight, 0.0)
     inside = np.clip(-cosine, 1e-4, 1.0)
-    place, mu = _places(index)
-    down = surface.sample(-_directions(mu, lattice), np.tile(lattice[:, :3], (len(mu), 1)), "importance", "float64")
+    place, mu = places(index)
+    down = surface.sample(-directions(mu, lattice), np.tile(lattice[:, :3], (len(mu), 1)), "importance", "float64")
     weight = np.where(down.pdf > 0.0, down.weight.mean(1), 0.0).reshape(len(mu), POINTS)
     weight /= weight.sum(1, keepdims=True)
     cosine = down.wi[:, 2].reshape(len(mu), POINTS)
@@ -270,34 +232,9 @@ def _interface(coat: Coated, index: float) -> _Interface:
         lambda cos: np.interp(np.sqrt(cos), fine, once + more * (scale > 0.0)),
         lambda p: np.interp(p, place, leaves),
         lambda cos: np.interp(np.sqrt(cos), fine, more * scale),
-        _Spread.of(goes_in, inside, index),
-        _Spread.of(stays, returning_cosine, index),
+        Spread.of(goes_in, inside, index),
+        Spread.of(stays, returning_cosine, index),
     )
-
-
-def _directions(mu: Floats, lattice: Floats) -> Floats:
-    """Directions with each cosine at each azimuth of the lattice, (len(mu) * len(lattice), 3)."""
-    phi, sin = np.tile(2.0 * np.pi * lattice[:, 3], len(mu)), np.repeat(np.sqrt(1.0 - mu**2), len(lattice))
-    return frame.spherical_array(sin, np.repeat(mu, len(lattice)), phi)
-
-
-def _places(index: float) -> tuple[Floats, Floats]:
-    """The positions of the nodes, and their cosines inside. Positions from 0 to 1 are the square root of the cosine
-    outside, for light that can leave, whose amount varies fast at grazing angles; those from -1 to 0 are for light that
-    is totally reflected."""
-    place = np.linspace(-1.0, 1.0, 2 * HALF + 1)
-    critical = np.sqrt(max(1.0 - index**-2, 0.0))
-    mu = np.where(place >= 0.0, np.sqrt(1.0 - (1.0 - place**4) / index**2), critical * (1.0 - place**2))
-    return place, np.clip(mu, 1e-4, 1.0)
-
-
-def _place_of(cosine: Floats, index: float) -> Floats:
-    """The positions of directions inside, from their cosines."""
-    outside2 = 1.0 - index**2 * (1.0 - cosine**2)
-    critical = np.sqrt(max(1.0 - index**-2, 0.0))
-    beyond = -np.sqrt(np.maximum(1.0 - cosine / max(critical, EPSILON), 0.0))
-    place: Floats = np.clip(np.where(outside2 > 0.0, np.maximum(outside2, 0.0) ** 0.25, beyond), -1.0, 1.0)
-    return place
 
 
 class _Draws(NamedTuple):
@@ -314,7 +251,7 @@ class _Draws(NamedTuple):
 
     place: Floats
     mu: Floats
-    samples: _Spread
+    samples: Spread
     totally: Floats
     out: Floats
     crossing: Floats
@@ -326,9 +263,9 @@ def _drawn(base: BSDF, index: float, face: _Interface) -> _Draws:
     """Samples of the lossless base for light from the nodes' directions, over all azimuths. A base that is its own
     lossless variant is normalized to its brightest channel."""
     white = base.lossless()
-    place, mu = _places(index)
+    place, mu = places(index)
     lattice = r_sequence(POINTS, 4)
-    wo = _directions(mu, lattice)
+    wo = directions(mu, lattice)
     drawn = white.sample(wo, np.tile(lattice[:, :3], (len(mu), 1)), precision="float64")
     channels = drawn.weight
     colors, share = np.array([0.0, 1.0]), np.stack([0.0 * channels[:, 0], 1.0 + 0.0 * channels[:, 0]])
@@ -346,11 +283,11 @@ def _drawn(base: BSDF, index: float, face: _Interface) -> _Draws:
     weight /= np.maximum(weight.sum(1, keepdims=True), 1.0)  # the series would diverge for a base that gains light
     cosine = np.clip(drawn.wi[:, 2], 1e-4, 1.0).reshape(len(mu), POINTS)
     share = share.reshape(-1, len(mu), POINTS)
-    position = _place_of(cosine, index)
+    position = place_of(cosine, index)
     totally = (weight * (position <= 0.0)).sum(1) / np.maximum(weight.sum(1), EPSILON)
     out = np.where((position <= 0.0) & (face.entering is None), 0.0, face.out(position))
     crossing = np.where(position > 0.0, face.lobe(np.maximum(position, 0.0) ** 2), 0.0)
-    return _Draws(place, mu, _Spread.of(weight, cosine, index), totally, out, crossing, colors, share)
+    return _Draws(place, mu, Spread.of(weight, cosine, index), totally, out, crossing, colors, share)
 
 
 class _Sum(NamedTuple):
@@ -380,9 +317,9 @@ def _series(draws: _Draws, colors: Floats, u: float, face: _Interface) -> _Sum:
         lobe = face.lobe(x) * through * np.interp(root, draws.place, (weight * draws.crossing * t).sum(1))
         kinds.append((P, (weight * draws.out * t).sum(1), lobe))
     if face.entering is None:
-        enters = _at_nodes(root, draws.place) * ((1.0 - face.reflected(x)) * through)[:, None]
+        enters = at_nodes(root, draws.place) * ((1.0 - face.reflected(x)) * through)[:, None]
     else:
-        enters = _at_nodes(root, np.linspace(0.0, 1.0, ROUGH)) @ face.entering.matrix(face.entering.left(u))
+        enters = at_nodes(root, np.linspace(0.0, 1.0, ROUGH)) @ face.entering.matrix(face.entering.left(u))
     area = np.gradient(root) * 2.0 * root**3  # x dx
     judged = x > 1e-3  # both vanish at the horizon
     rests, factors, norms, share = [], [], [], 0.0 * x
@@ -409,8 +346,3 @@ def _series(draws: _Draws, colors: Floats, u: float, face: _Interface) -> _Sum:
 def _continued(values: list[Floats]) -> Floats:
     """The values at each u, stacked along the last axis and extrapolated linearly by one node."""
     return np.stack([*values, 2.0 * values[-1] - values[-2]], -1)
-
-
-def _at_nodes(x: Floats, nodes: Floats) -> Floats:
-    """The matrix that interpolates linearly between values at nodes."""
-    return np.stack([np.interp(x, nodes, one) for one in np.eye(len(nodes))], -1)
