@@ -12,7 +12,7 @@ SLACK = 0.1  # degrees by which the last node of a table may lie above the horiz
 
 
 class AngularRange(NamedTuple):
-    """The smallest and largest of each angle, in degrees.
+    """The smallest and largest value of each angle, in degrees.
 
     view     angle between wo and the normal, 0 to 90
     light    angle between wi and the normal or its opposite, 0 to 90

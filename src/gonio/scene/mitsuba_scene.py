@@ -69,8 +69,8 @@ def load(
 def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
     """Turn errors that a scene causes during rendering into InputErrors with Mitsuba's text.
 
-    own_integrator  whether the scene is rendered by its own integrator, so that all errors except those of Gonio's
-                    materials are Mitsuba's; otherwise only errors of plugins are, such as
+    own_integrator  whether the scene is rendered by its own integrator. If so, every error that was not raised by one
+                    of Gonio's materials is attributed to Mitsuba; otherwise, only errors raised by plugins, such as
                     "[Texture] eval_1_grad(): not implemented!"
     """
     try:
@@ -89,7 +89,8 @@ def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
 
 
 def load_bsdf(path: Path) -> MitsubaBSDF:
-    """The BSDF of a Mitsuba XML file: its root, or the first BSDF of a scene. It may read files in the same folder.
+    """The BSDF of a Mitsuba XML file: its root, or the first BSDF of a scene. The file may
+    refer to other files in the same folder.
 
     Raises InputError if there is none.
     """

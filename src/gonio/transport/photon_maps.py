@@ -44,12 +44,12 @@ class _Trail:
 
 
 class PhotonMaps:
-    """The maps of a render; only one exists at a time.
+    """The photon maps of a render, of which only one is in memory at a time.
 
     current  the map of the current samples
-    density  approximate number of arriving particles per area; computed from the first map and used for all
+    density  approximate number of arriving particles per unit area; computed from the first map and used for all
 
-    radius_factor  factor applied to the default first radius
+    radius_factor  factor applied to the default radius of the first map
     """
 
     def __init__(self, data: SceneData, seed: int, max_depth: UInt, radius_factor: float) -> None:

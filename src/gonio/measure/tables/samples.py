@@ -109,8 +109,8 @@ class Samples(Guided, Measurement):
 
     @property
     def angular_range(self) -> AngularRange:
-        """The range of the two directions together, since a pair also represents its swapped pair; the normal is within
-        it if it lies among measured directions."""
+        """The combined range of both directions, since by reciprocity each pair also stands for the pair with wo and wi
+        swapped. The range includes the normal if measured directions surround it."""
         ends = np.sort(self.directions[:, [0, 2]], axis=None)
         ends[0] = 0.0 if ends[0] < AROUND else ends[0]
         return of_nodes(ends, ends, np.zeros(0))
