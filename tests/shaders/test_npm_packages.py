@@ -47,7 +47,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("three", "wgpu"):
         npm("pack", "--pack-destination", str(place), folder=place / "web/packages" / name)
         with tarfile.open(place / f"gonio-{name}-{go.__version__}.tgz") as packed:
-            packed.extractall(place / f"gonio-{name}", filter="data")
+            packed.extraction_filter = getattr(tarfile, "data_filter", None)  # not in Python 3.11.3 and older
+            packed.extractall(place / f"gonio-{name}")
     (place / "index.html").write_text(PAGE)
     shutil.copy(Path(__file__).parent / "drop_in.mjs", place)
     (place / "node_modules").mkdir()
