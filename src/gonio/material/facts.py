@@ -80,7 +80,7 @@ class Interior(NamedTuple):
 
     eta         index of the medium, relative to vacuum if media are nested, else relative to the outside
     absorption  absorption coefficient, per unit length
-    priority    priority of the medium; where media overlap, the one with the highest priority is present
+    priority    priority of the medium; where media overlap, the one with the highest priority applies
     """
 
     eta: Scalar

@@ -231,7 +231,8 @@ def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
 
 
 class PhotonDensity:
-    """The approximate number of arriving particles per area: one number per cube of space, computed once from one map.
+    """The approximate number of arriving particles per unit area: one number per cube of space, computed once from one
+    map.
 
     It only determines weights, which are correct for any number as long as all estimators use the same one.
     """

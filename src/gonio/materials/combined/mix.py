@@ -16,7 +16,7 @@ from ...ops import Direction, Mask, Mode, Scalar, Spectrum, safe_div, vec3, wher
 
 
 class Mix(BSDF):
-    """(1 - weight) a + weight b: the weighted average of two materials, as for a fine patchwork of the two."""
+    """(1 - weight) a + weight b: the weighted average of two materials, as in an unresolved patchwork of the two."""
 
     a: BSDF = bsdf("the material at weight 0")
     b: BSDF = bsdf("the material at weight 1")

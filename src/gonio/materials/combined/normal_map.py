@@ -35,17 +35,17 @@ class _Frame(NamedTuple):
 
 
 class NormalMap(BSDF):
-    """A base with a tilted normal, n' = (lean_x, lean_y, 1), normalized; in scenes an image of normals, `"normalmap"`.
+    """A base with a tilted normal, n' = (lean_x, lean_y, 1), normalized; in scenes, given by an image, `"normalmap"`.
 
     f cos theta_i = b(o, i) + b(o, i*), where b is `eval` of the base in the frame of n', and i* = (i_x, i_y, -i_z)
 
     Surfaces with tilted normals usually turn black at grazing angles, for two reasons, both of which are corrected
-    here. First, the view may lie behind the base; n' is then bent toward the view, as little as necessary (Keller2017
-    does this for the mirrored view). Second, the base scatters light below the surface: (1 - n'.n) / 2 of it for a
-    white diffuse base, with n the normal of the surface. This light is reflected upward again, as by neighboring
-    facets. A white base thus remains white at any tilt, and no light is created. If the base transmits, n' is bent,
-    but light that leaves on the wrong side is lost. Not reciprocal, because n' depends on the view. Scattered light is
-    unpolarized.
+    here. First, the view direction may lie behind the tilted base; n' is then bent toward the view, as little as
+    necessary (Keller2017 does this for the mirrored view). Second, the base scatters light below the surface:
+    (1 - n'.n) / 2 of it for a white diffuse base, with n the normal of the surface. This light is reflected upward
+    again, as by neighboring facets. A white base thus remains white at any tilt, and no light is created. If the base
+    transmits, n' is bent, but light that leaves on the wrong side is lost. The model is not reciprocal, because n'
+    depends on the view. Scattered light is unpolarized.
 
     A surface of two facets (Schuessler2017) conserves energy as well. If the second facet is a mirror, however, diffuse
     bumps become invisible: viewed from above, their brightness is n'.n cos theta_i in whichever direction they tilt.
@@ -176,12 +176,12 @@ def _flipped(w: Direction) -> Direction:
 
 
 class Bump(NormalMap):
-    """A base with the normal of a height field (Blinn1978); in scenes an image of heights, `"bump"`.
+    """A base with the normal of a height field (Blinn1978); in scenes, the heights are given by an image, `"bump"`.
 
-    The height h(u, v) is in units of the scene, with derivatives h_u and h_v. With dp/du = (l, 0) and dp/dv = (s, m)
-    in the tangent plane, its gradient is g = (h_u / l, (h_v - s h_u / l) / m), and n' = (-g, 1), normalized. Outside
-    scenes, where dp/du and dp/dv are unknown, they are taken to be x and y. In all other respects, this is
-    `normal-map`.
+    The height h(u, v) is in scene units and has the derivatives h_u and h_v. With dp/du = (l, 0) and dp/dv = (s, m) in
+    the tangent plane, its gradient is g = (h_u / l, (h_v - s h_u / l) / m), and n' = (-g, 1), normalized. Outside
+    scenes, where dp/du and dp/dv are unknown, they are taken to be x and y. In all other respects, this material is
+    identical to `normal-map`.
     """
 
     lean_x: Number = number(default=0.0, doc="h_u, derivative of the height with respect to u", low=-1e6, high=1e6)

@@ -16,10 +16,10 @@ from .mix import ALMOST_ONE
 
 
 class Opacity(BSDF):
-    """The base on a fraction `opacity` of the surface, and holes elsewhere: the rest of the light passes straight
-    through, unchanged, as a delta lobe, from either side. A texture of zeros and ones represents cutouts such as leaves
-    and fences; values in between represent fabrics with unresolved holes. A base that only reflects is black from
-    below unless it is wrapped in `two-sided`.
+    """The base on a fraction `opacity` of the surface, and holes elsewhere, through which light from either side passes
+    straight and unchanged, as a delta lobe. A texture of zeros and ones represents cutouts such as leaves and fences;
+    values in between represent fabrics with unresolved holes. A base that only reflects is black from below unless it
+    is wrapped in `two-sided`.
     """
 
     base: BSDF = bsdf("the material between the holes")

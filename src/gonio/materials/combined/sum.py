@@ -16,8 +16,8 @@ from ...ops import Direction, Mask, Mode, Spectrum
 class Sum(BSDF):
     """a + b: the sum of two materials, as in fits to measurements, such as "lambert+conductor" (Ngan2005).
 
-    Together, the two can reflect more light than they receive. Sampled by a guide. A material that consists of a delta
-    lobe is rejected, since its `eval` is 0.
+    Together, the two can reflect more light than they receive. They are sampled by a guide (a tabulated density). A
+    material that consists of a delta lobe is rejected, since its `eval` is 0.
     """
 
     a: BSDF = bsdf("the first material")

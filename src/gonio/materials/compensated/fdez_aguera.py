@@ -35,13 +35,13 @@ class Derived(NamedTuple):
 
 
 class FdezAguera(_Compensated):
-    """f_base + F_ms E_ms / pi: multiple scattering as light from a diffuse surface (FdezAguera2019).
+    """f_base + F_ms E_ms / pi: multiple scattering, approximated by a diffuse lobe (FdezAguera2019).
 
     A and B are the coefficients of the split sum, functions of mu_o = cos theta_o and alpha; F0 is the reflectance at
     normal incidence. With FssEss = F0 A + B, Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21:
-    F_ms = FssEss F_avg / (1 - E_ms F_avg). Designed for prefiltered lighting, FssEss * radiance + F_ms E_ms *
-    irradiance. As a BSDF, the second term is a diffuse lobe that depends on wo only, so it is not reciprocal. The
-    method assumes Schlick's approximation of F.
+    F_ms = FssEss F_avg / (1 - E_ms F_avg). The method was designed for prefiltered lighting,
+    FssEss * radiance + F_ms E_ms * irradiance. As a BSDF, the second term is a diffuse lobe that depends on wo only, so
+    the model is not reciprocal. It assumes Schlick's approximation of F.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {

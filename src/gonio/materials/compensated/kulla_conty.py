@@ -50,7 +50,8 @@ class KullaConty(_Compensated):
 
     E(mu) is the albedo of the base at F = 1 for mu = cos theta, E_avg = 2 int E mu dmu and F_avg = 2 int F mu dmu.
     f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)), whose albedo is 1 - E(mu_o); f_add depends on `color`. At
-    F = 1, no light is lost. Reciprocal. As alpha -> 0, the term vanishes: (1 - E)^2 tends to 0 faster than 1 - E_avg.
+    F = 1, no light is lost. The model is reciprocal. As alpha -> 0, the term vanishes: (1 - E)^2 tends to 0 faster than
+    1 - E_avg.
 
     For a conductor or a dielectric, E is a short polynomial accurate to 1e-4 (`compensation.curves`), valid for any
     alpha, including textures and gradients. A dielectric that transmits has a reflected and a transmitted lobe on each
@@ -58,11 +59,11 @@ class KullaConty(_Compensated):
     lobes follows from reciprocity (Kulla2017, p. 30).
 
     The albedo of any other base that only reflects, by a finite isotropic lobe, is computed once
-    (`compensation.measured`): E is the albedo with F = 1 and with every color that is a fraction of the light set to 1;
-    F_avg is the ratio of the actual albedo to E. Lambert loses nothing; Oren-Nayar loses the interreflections; a
-    material without such colors, such as Phong, loses all light that its brightest channel does not reflect. If the
-    base gains energy, the gain is not corrected. The parameters of such a base must not vary over the surface, and
-    there is no shader code.
+    (`compensation.measured`): E is the albedo with F = 1 and with every color that represents a fraction of light set
+    to 1; F_avg is the ratio of the actual albedo to E. By this definition, Lambert loses nothing; Oren-Nayar loses the
+    interreflections; a material without such colors, such as Phong, loses all light that its brightest channel does not
+    reflect. If the base gains energy, the gain is not corrected. The parameters of such a base must not vary over the
+    surface, and there is no shader code.
 
     With the masking term schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = 0.835 at roughness 0.05), so the
     compensation adds a spurious bright rim to smooth surfaces.

@@ -21,9 +21,9 @@ class RandomWalk(_Compensated):
 
     The expectation is the exact multiple scattering of a Smith microsurface: `eval` and the weight are random
     estimates, generated from a hash of the two directions and `seed`. A renderer uses new directions for each sample
-    and needs no seed; for independent estimates at one pair of directions, pass an array as `seed`. Requires the ndf
-    "ggx" and the masking term "smith-correlated". Slow and noisy; intended as a reference. The walk cannot be recorded,
-    so there is no shader code.
+    and needs no seed; for independent estimates at one pair of directions, pass an array as `seed`. The base must have
+    the ndf "ggx" and the masking term "smith-correlated". The method is slow and noisy; it is intended as a reference.
+    The walk cannot be recorded, so there is no shader code.
     """
 
     stochastic: ClassVar[bool] = True

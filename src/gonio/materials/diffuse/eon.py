@@ -26,7 +26,7 @@ FIT = (0.0571085289, 0.491881867, -0.332181442, 0.0714429953)  # of G / pi in po
 
 FORMS = {
     "exact": "by the closed form, with an arc cosine",
-    "fit": "by a polynomial in the cosine, within a thousandth",
+    "fit": "by a polynomial in the cosine, accurate to within a thousandth",
 }
 
 
@@ -40,8 +40,8 @@ class Eon(BSDF):
     rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the color of light that bounces twice or more
 
     Unlike `oren-nayar`, it conserves all light at rho = 1 for any roughness and angle, has no dark ring at grazing
-    angles, and becomes more saturated as roughness increases. Reciprocal. Sampled by a clipped linearly transformed
-    cosine, mixed with uniform directions (sec. 4 of the paper).
+    angles, and becomes more saturated as roughness increases. The model is reciprocal. It is sampled by a clipped
+    linearly transformed cosine, mixed with uniform directions (sec. 4 of the paper).
     """
 
     albedo: Colour = spectrum(default=0.5, doc="rho, the fraction of light reflected per bounce", low=0.0, high=1.0)

@@ -15,7 +15,8 @@ from ...ops import Direction, Mode, Scalar, Spectrum, abs, inv_pi, where
 class Lambert(BSDF):
     """Ideal diffuse reflection: f = albedo / pi, the same in every direction (course notes, part B).
 
-    Reciprocal, and energy-conserving for albedo <= 1. Sampled by the cosine.
+    The model is reciprocal, and conserves energy for albedo <= 1. Directions are sampled with a density proportional to
+    the cosine.
     """
 
     albedo: Colour = spectrum(default=0.5, doc="fraction of light that is reflected", low=0.0, high=1.0, soft_high=True)

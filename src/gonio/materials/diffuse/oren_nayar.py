@@ -23,8 +23,8 @@ class OrenNayar(BSDF):
 
     No trigonometric function is evaluated: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and
     the product of the two sines and the cosine of the azimuth is the dot product of the tangential components. The
-    model is valid for small sigma only (up to about 0.5 rad); beyond, the formula is used unchanged. It omits
-    interreflections, so it loses more energy as sigma grows. At grazing angles, the directional albedo tends to
+    model is valid for small sigma only (up to about 0.5 rad); beyond this range, the formula is used unchanged. It
+    omits interreflections, so it loses more energy as sigma grows. At grazing angles, the directional albedo tends to
     albedo (A + B / 2), which exceeds 1 for albedo = 1 and sigma < 0.33.
     """
 

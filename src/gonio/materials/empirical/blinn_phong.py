@@ -19,7 +19,7 @@ class BlinnPhong(_Empirical):
     """Phong's model with the highlight (n.h)^p, h the half vector (Blinn1977): kd cos theta_i + ks max(0, n.h)^p.
 
     n.h is never negative for light and viewer above the surface, so the highlight has no cut-off edge. A highlight as
-    wide as Phong's needs about four times the exponent. Neither reciprocal nor energy-conserving.
+    wide as Phong's needs about four times the exponent. The model is neither reciprocal nor energy-conserving.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {

@@ -118,12 +118,12 @@ class _Empirical(BSDF):
 
 
 class Phong(_Empirical):
-    """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p, r = l mirrored at n (course sheet, eq. 1; Phong1975).
+    """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p, r = l mirrored about n (course sheet, eq. 1; Phong1975).
 
     Ia and I are the ambient and the direct light, n is the normal, l = wi and v = wo. eval(wo, wi) =
     kd cos theta_i + ks max(0, v.r)^p; the renderer applies the falloff of the light with distance. v.r is clamped to
     0, because an even p would otherwise cause a second highlight on the opposite side. Light from below the surface
-    contributes nothing. Neither reciprocal nor energy-conserving.
+    contributes nothing. The model is neither reciprocal nor energy-conserving.
     """
 
     def _highlight_power(self) -> np.ndarray:

@@ -24,7 +24,7 @@ class AshikhminShirley(_Glossy):
     p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)), normalized over half vectors h.
     The exponents n_x and n_y are given by `exponent`. F is Schlick's approximation, as in the paper, with
     F0 = ((eta - 1) / (eta + 1))^2. The diffuse term is Lambertian or, if `coupled`, that of the paper, which excludes
-    the light that F0 reflects and decreases toward grazing angles. Reciprocal.
+    the light that F0 reflects and decreases toward grazing angles. The model is reciprocal.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
@@ -34,7 +34,9 @@ class AshikhminShirley(_Glossy):
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: str = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
-    coupled: bool = flag(default=False, doc="whether the diffuse term is that of the paper, reduced by the lobe")
+    coupled: bool = flag(
+        default=False, doc="whether the diffuse term is that of the paper, which excludes the light that F0 reflects"
+    )
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"specular": 0.0}, mutes=("exponent", "rotation", "eta")),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}

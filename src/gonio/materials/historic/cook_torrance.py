@@ -20,12 +20,12 @@ from .glossy import _Glossy, facet, sum_breach
 class CookTorrance(_Glossy):
     """Rough metal or varnish in the original form: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Cook1982).
 
-    As published, D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), for the angle between h and n, is Beckmann's distribution
-    without the factor 1 / pi, and G is that of V-grooves. Today, D includes 1 / pi and the denominator has a 4 in place
-    of pi (`conductor`), so this lobe is four times as bright as a surface with this distribution, and specular = 1/4
-    corresponds to a real surface. Ngan2005 divides by pi once more. F is that of an index eta without absorption; for a
-    metal of reflectance F0, set eta to (1 + sqrt(F0)) / (1 - sqrt(F0)). Reciprocal. Sampled by the visible normals of
-    Beckmann's distribution with Smith masking.
+    As published, D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), with the tangent and cosine of the angle between h and n,
+    is Beckmann's distribution without the factor 1 / pi, and G is that of V-grooves. Today, D includes 1 / pi and the
+    denominator has a 4 in place of pi (`conductor`), so this lobe is four times as bright as a surface with this
+    distribution, and specular = 1/4 corresponds to a real surface. Ngan2005 divides by pi once more. F is computed for
+    a real index eta, without absorption; for a metal of reflectance F0, set eta to (1 + sqrt(F0)) / (1 - sqrt(F0)). The
+    model is reciprocal. It is sampled by the visible normals of Beckmann's distribution with Smith masking.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """

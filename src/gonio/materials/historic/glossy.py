@@ -121,7 +121,7 @@ def sum_breach(more: str = "") -> KnownViolation:
     more  a reason due to the lobe alone, which precedes that of the sum
     """
     return KnownViolation(
-        f"{more}the two terms are added, and nothing keeps their sum below 1",
+        f"{more}the two terms are added, and their sum may exceed 1",
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
         certain=False,  # the bound need not be reached
     )

@@ -50,11 +50,11 @@ class HeTorrance(_Glossy):
     factors cancel. S is Smith masking for Beckmann slopes of this width, times (1 + erf(cot theta / width)) / 2 for
     each direction, with the exponential that is missing from the printed eq. 25 (Holzschuch2017).
 
-    As in Ngan2005, F is that of a real index, for unpolarized light, and there is no coherent (mirror) term, since
-    measured tables do not contain it. Above g = 18, D is the limit of the series,
-    exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2), with h the angle between the half vector and n. Reciprocal.
-    Lengths are in nm; only their ratios matter. Sampled by the visible normals of GGX, with the width of the lobe at
-    its peak.
+    As in Ngan2005, F is computed for a real index and unpolarized light, and the coherent (mirror) term is omitted,
+    since measured tables do not contain it. Above g = 18, D is the limit of the series,
+    exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2), with h the angle between the half vector and n. The model
+    is reciprocal. Lengths are in nm; only their ratios matter. The model is sampled by the visible normals of GGX, with
+    the width of the lobe at its peak.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """

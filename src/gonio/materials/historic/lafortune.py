@@ -22,11 +22,11 @@ SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which the lobe 
 class Lafortune(_Glossy):
     """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
 
-    The three factors C are cx, cy and cz, n is `exponent`, and the base of the power is clamped to 0 (Lafortune1997,
-    eq. 4). C = (-1, -1, 1) gives Phong's lobe about the mirror direction, normalized (Lafortune1994), which Ngan2005
-    calls Blinn-Phong. A cz below 1 tilts the lobe toward the horizon, and positive cx and cy cause retro-reflection.
-    The largest |C| should be 1, as in the normalization of Ngan2005, since the lobe scales with its n-th power.
-    Reciprocal. Sampled by a power lobe about (cx o_x, cy o_y, cz o_z).
+    The three factors C are cx, cy and cz, n is `exponent`, and negative bases of the power are clamped to 0
+    (Lafortune1997, eq. 4). C = (-1, -1, 1) gives Phong's lobe about the mirror direction, normalized (Lafortune1994),
+    which Ngan2005 calls Blinn-Phong. A cz below 1 tilts the lobe toward the horizon, and positive cx and cy cause
+    retro-reflection. The largest |C| should be 1, as in the normalization of Ngan2005, since the lobe scales with its
+    n-th power. The model is reciprocal. It is sampled by a power lobe about (cx o_x, cy o_y, cz o_z).
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """

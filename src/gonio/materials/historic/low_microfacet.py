@@ -22,7 +22,7 @@ class LowMicrofacet(_Glossy):
     """Microfacets with a power-law distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
 
     D = (1 + b (1 - n.h))^-c is not normalized, so `specular` includes the height of the peak of D. G is that of
-    V-grooves, and the factor 1 / pi is that of Cook1982. Reciprocal. Sampled by the power law of D.
+    V-grooves, and the factor 1 / pi is that of Cook1982. The model is reciprocal. It is sampled by the power law of D.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """

@@ -38,16 +38,16 @@ RIM = 0.25
 class LowSmooth(_Glossy):
     """Rayleigh-Rice scattering of a nearly smooth surface: f = diffuse / pi + specular (1 + b |Dp|^2)^-c F (Low2012).
 
-    Dp, the tangential component of o + i, is the deviation of the pair from mirror reflection; the lobe follows the
-    power spectrum of polished surfaces (Church1990; the ABC model). F is evaluated at cos = sqrt(1 - |q|^2 / 4), where
-    q is the tangential component of o - i; for a mirrored pair, this is the cosine of incidence. Reciprocal.
-    `specular` is the height of the peak divided by F, 1/sr, not an albedo. Sampled by the lobe's power law, truncated
-    near the rim of the disk of projected directions.
+    Dp, the tangential component of o + i, measures how far the pair deviates from mirror reflection; the lobe follows
+    the power spectrum of polished surfaces (Church1990; the ABC model). F is evaluated at cos = sqrt(1 - |q|^2 / 4),
+    where q is the tangential component of o - i; for a mirrored pair, this is the cosine of incidence. The model is
+    reciprocal. `specular` is not an albedo but the height of the peak divided by F, in 1/sr. The model is sampled by
+    the lobe's power law, truncated near the rim of the disk of projected directions.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """
 
-    specular: Colour = spectrum(default=10.0, doc="height of the peak divided by F, 1/sr", low=0.0)
+    specular: Colour = spectrum(default=10.0, doc="height of the peak divided by F, in 1/sr", low=0.0)
     b: Number = number(default=300.0, doc="narrowness of the peak, which ends at |Dp| = 1 / sqrt(b)", low=1e-3)
     c: Number = number(default=1.0, doc="falloff beyond the peak, as |Dp|^(-2 c)", low=0.0)
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)

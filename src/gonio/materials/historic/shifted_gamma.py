@@ -46,9 +46,9 @@ class ShiftedGamma(_Glossy):
 
     The angle `reach` replaces the paper's c = reach^-k, which exceeds 1e100 in its fits. D integrates to 1 if
     normalization = 1 / (alpha Gamma(1 - p, alpha)). All values are fitted: F can exceed 1 and, for f1 > f0, be
-    negative; G1 and the lobe can be negative at the horizon, as published. Reciprocal. Sampled, for the smallest and
-    the largest alpha of the channels, by a power law and an exponential, which together approximate D within a factor
-    of e.
+    negative; G1 and the lobe can be negative at the horizon, as published. The model is reciprocal. It is sampled, for
+    the smallest and the largest alpha of the channels, by a power law and an exponential, which together approximate D
+    within a factor of e.
 
     The presets are the fits of Bagher2012 to the materials of the MERL database.
     """

@@ -17,10 +17,10 @@ from .glossy import _Glossy, facet, sum_breach
 class Ward(_Glossy):
     """Ward's Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
 
-    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), with the half vector h (Walter2005). Reciprocal. The
-    albedo of a narrow lobe is specular cos theta_o, so it loses energy toward grazing angles; a wide lobe, which
-    extends toward the normal, gains energy without bound there. Sampled by half vectors with density D (n.h), where D
-    is Beckmann's distribution.
+    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), with the half vector h (Walter2005). The model is
+    reciprocal. The albedo of a narrow lobe is specular cos theta_o, so the lobe loses energy toward grazing angles; a
+    wide lobe, which extends toward the normal, gains energy without bound there. The model is sampled by half vectors
+    with density D (n.h), where D is Beckmann's distribution.
 
     The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
     """

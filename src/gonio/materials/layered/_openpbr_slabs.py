@@ -43,7 +43,7 @@ NARROWEST = 1e-3  # lower limit of the smaller of two widths
 NEAREST = 1.001  # smallest relative index: closer to 1, the facet of a refraction cannot be determined
 LAYERINGS = {
     "reciprocal": "a layer attenuates the light below along both directions, which is reciprocal",
-    "albedo": "one minus the albedo at wo attenuates it, as in the reduction of the specification to a sum of lobes",
+    "albedo": "the light below is scaled by one minus the albedo at wo, as in the specification's sum of lobes",
 }
 
 
@@ -77,10 +77,13 @@ class _OpenPBR(BSDF):
         default=0.0, doc="fraction of the dielectric that transmits light", low=0.0, high=1.0, off=0.0
     )
     transmission_color: Colour = spectrum(
-        default=1.0, doc="color of white light after `transmission_depth`; a tint if that is 0", low=0.0, high=1.0
+        default=1.0, doc="color of white light after `transmission_depth`; a tint if the depth is 0", low=0.0, high=1.0
     )
     transmission_depth: Number = number(
-        default=0.0, doc="distance after which light has `transmission_color`; 0 tints the surface", low=0.0, high=1e6
+        default=0.0,
+        doc="distance after which white light has `transmission_color`; 0 tints the surface",
+        low=0.0,
+        high=1e6,
     )
     transmission_scatter: Colour = spectrum(
         default=0.0, doc="volume scattering; must be 0, since surfaces have none", low=0.0, inside=True
@@ -267,11 +270,13 @@ class _OpenPBR(BSDF):
     # ------------------------------------------------------------------ reflectances
 
     def film_change(self, cos: Scalar, eta: Spectrum, k: Spectrum | None, medium: Scalar) -> Spectrum:
-        """Change of R by the film on a base of index eta + i k, relative to the medium, at a cosine outside.
+        """Change in R due to the film, on a base of index eta + i k relative to the medium, at the cosine `cos`
+        outside.
 
-        It is R with the film minus R with a film of thickness 0, both by the same formula. The base without the film
-        has its own reflectance (the F82 curve of a metal), and the three harmonics of the formula do not sum to
-        Fresnel's equations; due to the difference, a film of thickness 0, or of the medium's index, changes nothing.
+        It is R with the film minus R with a film of thickness 0, both by the same formula. A difference is used because
+        the bare base has its own reflectance (for a metal, the F82 curve), which the formula does not reproduce, and
+        because the formula's three harmonics do not sum to Fresnel's equations. With the difference, a film of
+        thickness 0, or with the index of the medium, has no effect.
         """
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(medium))
         thickness = 1000.0 * self.thin_film_thickness

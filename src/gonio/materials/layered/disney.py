@@ -67,8 +67,9 @@ class Disney(BSDF):
     with the base color for metal. f_r is a second lobe, GTR1 with a width from 0.1 to 0.001 and F0 = 0.04. Tints are
     the base color divided by the mean of its channels (in the paper, by its luminance).
 
-    The lobes are simply added, as artists preferred: at grazing angles, or if several parameters are large, the model
-    reflects more light than it receives, while rough metal loses multiply scattered light. Reciprocal.
+    The lobes are simply added, since artists preferred this: at grazing angles, or if several parameters are large, the
+    model reflects more light than it receives, while rough metal loses multiply scattered light. The model is
+    reciprocal.
     """
 
     base_color: Colour = spectrum(default=0.5, doc="color of the surface", low=0.0, high=1.0)
@@ -81,7 +82,9 @@ class Disney(BSDF):
     roughness: Number = number(default=0.5, doc="square root of alpha", low=0.0, high=1.0)
     anisotropic: Number = number(default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0)
     rotation: Angle = microfacet.rotation_angle()
-    sheen: Number = number(default=0.0, doc="strength of an additional rim, for cloth", low=0.0, high=1.0)
+    sheen: Number = number(
+        default=0.0, doc="strength of an additional lobe at grazing angles, for cloth", low=0.0, high=1.0
+    )
     sheen_tint: Number = number(default=0.5, doc="fraction of the base color in the sheen", low=0.0, high=1.0)
     clearcoat: Number = number(default=0.0, doc="strength of the clearcoat lobe", low=0.0, high=1.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 is glossy", low=0.0, high=1.0)
@@ -96,7 +99,7 @@ class Disney(BSDF):
     )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "the lobes are added, and rough diffuse reflection gains at grazing angles: nothing bounds their sum",
+            "the lobes are added without a bound on their sum, and rough diffuse reflection gains at grazing angles",
             2.5,
             certain=False,
         ),

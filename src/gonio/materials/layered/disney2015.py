@@ -52,7 +52,7 @@ class _Slabs(OpenPBR):
 
 
 class DisneyBSDF(BSDF):
-    """Disney's principled BSDF of 2015, on energy-conserving slabs: glass, metal and thin walls by one parameter set.
+    """Disney's principled BSDF of 2015, on energy-conserving slabs: glass, metal and thin walls in one parameter set.
 
     The parameters are those of Burley2015: those of `disney` with the index in place of `specular`, `spec_trans` for
     glass and, for a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass have the lobes of the paper:
@@ -62,9 +62,9 @@ class DisneyBSDF(BSDF):
     included. The slabs are those of `openpbr` and obey the same laws.
 
     The differences from the paper are: the diffuse lobe is `eon` of the same roughness under the dielectric (the lobe
-    of the paper has its own rim, which `flatness` removes; here `flatness` turns `eon` into Lambert); sheen is the
-    `sheen` of fibers; the coat is GGX with the width of the paper's GTR1; masking is height-correlated; tints are the
-    base color divided by its largest channel; and the transmission of a thin sheet is as rough as its reflection.
+    of the paper has a rim of its own, which `flatness` removes; here, `flatness` turns `eon` into Lambert); sheen is
+    the `sheen` of fibers; the coat is GGX with the width of the paper's GTR1; masking is height-correlated; tints are
+    the base color divided by its largest channel; and the transmission of a thin sheet is as rough as its reflection.
     docs/openpbr.md states how large these differences are.
     """
 
@@ -82,12 +82,15 @@ class DisneyBSDF(BSDF):
         default=0.0, doc="fraction of the base color in a dielectric's reflection", low=0.0, high=1.0
     )
     spec_trans: Number = number(default=0.0, doc="fraction of the dielectric that is glass", low=0.0, high=1.0, off=0.0)
-    sheen: Number = number(default=0.0, doc="weight of fibers on a dielectric", low=0.0, high=1.0, off=0.0)
+    sheen: Number = number(default=0.0, doc="weight of the fibers on a dielectric", low=0.0, high=1.0, off=0.0)
     sheen_tint: Number = number(default=0.5, doc="fraction of the base color in the sheen", low=0.0, high=1.0)
     clearcoat: Number = number(default=0.0, doc="strength of the coat", low=0.0, high=1.0, off=0.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 is glossy", low=0.0, high=1.0)
     diff_trans: Number = number(
-        default=0.0, doc="for a thin sheet: 0 is opaque, 1 equal to both sides, 2 fully transmitted", low=0.0, high=2.0
+        default=0.0,
+        doc="for a thin sheet: 0 is opaque, 1 scatters equally to both sides, 2 only transmits",
+        low=0.0,
+        high=2.0,
     )
     flatness: Number = number(default=0.0, doc="1 removes the roughness of the diffuse lobe", low=0.0, high=1.0)
     thin: bool = flag(default=False, doc="whether the surface is a sheet without an interior")

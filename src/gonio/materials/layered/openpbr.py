@@ -33,10 +33,10 @@ class OpenPBR(_OpenPBR):
     `dielectric` with multiple scattering.
 
     The parameters are those of the specification. Below a roughness of 0.01, base and coat are mirrors. Indices range
-    from 1 to 5. Subsurface scattering is local: with `geometry_thin_walled` it is as specified; otherwise it is a
-    diffuse lobe of its color, the limit of radius 0, with a warning. Volume scattering, dispersion and emission raise
-    InputError, since they are not properties of a surface. transmission_depth > 0 causes absorption inside, which
-    Gonio's integrators apply.
+    from 1 to 5. Subsurface scattering is local: with `geometry_thin_walled`, it is as specified; otherwise, it is a
+    diffuse lobe of the subsurface color, which is the limit of radius 0, and a warning is issued. Volume scattering,
+    dispersion and emission raise InputError, since they are not properties of a surface. A `transmission_depth` above 0
+    causes absorption inside, which Gonio's integrators apply.
     """
 
     name: ClassVar[str] = "openpbr"
@@ -86,11 +86,11 @@ class OpenPBR(_OpenPBR):
             certain=False,
         ),
         "limits": KnownViolation(
-            "the table of multiple scattering in metal is coarser for two widths, and for widths that vary",
+            "the table of multiple scattering in metal is coarser for two widths and for widths that vary in space",
             0.02,
             certain=False,
         ),
         "linearity": KnownViolation(
-            "the colors of layers are multiplied, for interreflected light more than once", 10.0, certain=False
+            "the colors of layers are multiplied, more than once for interreflected light", 10.0, certain=False
         ),
     }

@@ -16,15 +16,16 @@ from ...ops import Direction, Mode, Scalar, Spectrum, where
 class Measured(BSDF):
     """A table of measured values, interpolated in its own coordinates (course notes, part B).
 
-    Reads MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf), neural networks (.npz,
-    as FILE.npz:NAME) and Gonio's .gonio; docs/measured.md describes each format. Data are not corrected: negative
-    values remain negative, an albedo above 1 remains above 1, and a table that is not reciprocal remains so. Reflection
-    only; black from below. A table is sampled by its own densities (RGL) or by a density computed from its values.
+    The supported formats are MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf),
+    neural networks (.npz, as FILE.npz:NAME) and Gonio's .gonio; docs/measured.md describes each format. Data are not
+    corrected: negative values remain negative, an albedo above 1 remains above 1, and a table that is not reciprocal
+    remains so. The material only reflects; it is black from below. A table is sampled by its own densities (RGL) or by
+    a density computed from its values.
     """
 
     file: str = file(
         default=SAMPLE,
-        doc="file of measured values; `FILE:ITEM` selects one of several in a file; `sample` is part of Gonio",
+        doc="file of measured values; `FILE:ITEM` selects one of several tables in it; `sample` is included with Gonio",
     )
     only_rgb: ClassVar[bool] = True
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
@@ -42,12 +43,12 @@ class Measured(BSDF):
             certain=False,
         ),
         "isotropy": KnownViolation(
-            "the table is not mirror-symmetric, or its lookup computes sums that lose digits where a lobe ends",
+            "the table is not mirror-symmetric, or its lookup computes sums that lose digits at the edge of a lobe",
             lambda model: 0.0 if model.table.mirrored else 2.0,
             certain=False,
         ),
         "precision": KnownViolation(
-            "the lookup in the table computes sums that lose digits where a lobe ends",
+            "the table lookup computes sums that lose digits at the edge of a lobe",
             lambda model: 0.1 if model.table.sums else 0.0,
             certain=False,
         ),

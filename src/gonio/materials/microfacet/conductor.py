@@ -20,7 +20,7 @@ class Conductor(_Reflector):
     """Rough metal: f = albedo F D G / (4 (n.o)(n.i)), F at the half vector (Torrance1967; course sheet, eq. 4 to 11).
 
     D, G and F are chosen by name (`ndf`, `masking`, `fresnel`). For alpha below 1e-4, the surface is a perfect mirror.
-    Light that would be scattered more than once is lost: more than half of the light at alpha = 1.
+    Light that would be scattered more than once is lost; at alpha = 1, this is more than half of the light.
     """
 
     eta: Colour = spectrum(default=0.0, doc="real part of the refractive index, relative to the outside", low=0.0)

@@ -55,8 +55,8 @@ class Dielectric(microfacet._Microfacet):
     1e-4, the glass is smooth; for eta = 1, there is no surface. With `transmission=False`, light is only reflected.
 
     Absorption inside (`absorption`, by the Beer-Lambert law exp(-absorption length)) and the choice among overlapping
-    media (`priority`, Schmidt2002) are properties of paths: Gonio's integrators apply them, and no value of the surface
-    depends on them.
+    media (`priority`, Schmidt2002) are properties of paths: Gonio's integrators apply them, and the values of the
+    surface do not depend on them.
     """
 
     eta: Index = index(
@@ -74,7 +74,11 @@ class Dielectric(microfacet._Microfacet):
         default=0.0, doc="absorption coefficient inside", low=0.0, unit="1/length", inside=True
     )
     priority: Number = number(
-        default=0.0, doc="where media overlap, that of highest priority is present", low=-1e6, high=1e6, inside=True
+        default=0.0,
+        doc="where media overlap, the one with the highest priority applies",
+        low=-1e6,
+        high=1e6,
+        inside=True,
     )
 
     preset_kind: ClassVar[str] = "medium"

@@ -12,7 +12,7 @@ from ...optics.fresnel import film
 from ...optics.fresnel.polarization import Diattenuation
 from .conductor import Conductor
 
-FRESNELS = {"exact": "interference of the film's waves", "one": "F = 1, without any loss"}
+FRESNELS = {"exact": "interference of the waves reflected in the film", "one": "F = 1, without any loss"}
 
 
 def thickness_number() -> Number:
@@ -36,10 +36,10 @@ def bare(one: Conductor) -> Conductor:
 
 
 class FilmConductor(Conductor):
-    """Rough metal under a thin clear film: a `conductor` with the interference colors of F (Belcour2017).
+    """Rough metal under a thin clear film: a `conductor` whose F has the film's interference colors (Belcour2017).
 
     The film covers every facet. In spectral variants, F is evaluated per wavelength; otherwise, `form` determines how
-    RGB colors are computed, with the metal's indices at 650, 550 and 450 nm, interpolated linearly. In films thicker
+    RGB colors are computed, with the metal's indices at 650, 550 and 450 nm, interpolated linearly. For films thicker
     than 2 or 3 um, the fringes are closer together than the 20 nm steps of `local`.
     """
 

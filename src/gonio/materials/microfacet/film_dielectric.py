@@ -25,11 +25,12 @@ def bare(one: Dielectric) -> Dielectric:
 
 
 class FilmDielectric(Dielectric):
-    """Rough glass under a thin clear film: a `dielectric` with the interference colors of F (Belcour2017).
+    """Rough glass under a thin clear film: a `dielectric` whose F has the film's interference colors (Belcour2017).
 
     Light that the film does not reflect is transmitted, in the complementary colors. The film is on the outside: for
-    light from inside, F is that of the refracted direction. `form` and its limitations are those of `film-conductor`.
-    With eta = film_eta = 1, there is no surface; eta = 1 with film_eta = 1.33 is a soap bubble.
+    light from inside, the Fresnel reflectance F is evaluated at the refracted direction, outside. `form` and its
+    limitations are those of `film-conductor`. With eta = film_eta = 1, there is no surface; eta = 1 with
+    film_eta = 1.33 is a soap bubble.
     """
 
     if TYPE_CHECKING:  # the dielectric's parameters, which mypy does not recognize as declared
@@ -46,7 +47,11 @@ class FilmDielectric(Dielectric):
         Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare),
     )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "delta": KnownViolation("the reflectance is that of the film, not of the bare index", 1.0, certain=False)
+        "delta": KnownViolation(
+            "the reflectance is that of the coated interface, not the Fresnel reflectance for `eta` alone",
+            1.0,
+            certain=False,
+        )
     }
 
     @function

@@ -21,9 +21,9 @@ class Metal(_Reflector):
     """Rough metal with artist-friendly parameters: a color at normal incidence, and a tint at the edge (F82-tint,
     Kutz2021).
 
-    f = albedo F D G / (4 (n.o)(n.i)), with F = r0 at normal incidence, F = `edge` times the value of Schlick's curve at
-    82 degrees, so that an edge of 1 gives Schlick's curve, and F = 1 at 90 degrees. This is the metal of OpenPBR. It
-    has no refractive index: thin films and polarization require a `conductor`.
+    f = albedo F D G / (4 (n.o)(n.i)), with F = r0 at normal incidence, F = 1 at 90 degrees and, at 82 degrees,
+    F = `edge` times the value of Schlick's curve; an edge of 1 thus gives Schlick's curve. This is the metal of
+    OpenPBR. It has no refractive index: thin films and polarization require a `conductor`.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {

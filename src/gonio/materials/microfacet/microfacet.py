@@ -17,7 +17,7 @@ from ...optics.roughness import SMOOTH, widths
 
 SAMPLINGS = {
     "visible": "the normals visible from wo",
-    "bounded": "visible normals whose reflection may lie above the surface (GGX only; dielectrics: as visible)",
+    "bounded": "visible normals that can reflect wo above the surface (GGX reflection only; else as `visible`)",
     "normals": "all normals, with density D cos",
 }
 

@@ -44,15 +44,15 @@ class ThinDielectric(BSDF):
     sec. 9.5).
 
     With R the reflectance of one face and T = 1 - R, light that bounces between the two faces gives the sheet the
-    reflectance R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R) and the transmittance T' = 1 - R'. The sheet is thicker
-    than the coherence length of the light, but too thin to displace it visibly. R' is the mean of its values for the
-    two polarizations, 0.152 at 60 degrees for an index of 1.5. `bounces="mean"` computes R' from the mean R instead,
-    0.164, as do renderers without polarization.
+    reflectance R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R) and the transmittance T' = 1 - R'. The sheet is assumed
+    to be thicker than the coherence length of the light, but too thin to displace it visibly. R' is the mean of its
+    values for the two polarizations: 0.152 at 60 degrees for an index of 1.5. With `bounces="mean"`, R' is computed
+    from the mean R instead, as in renderers without polarization, which gives 0.164.
     """
 
     eta: Number = number(default=1.5, doc="index of the sheet, relative to its surroundings", low=0.2, high=5.0)
     fresnel: Member = microfacet.fresnel_choice()
-    bounces: str = choice("polarized", "reflectance that is summed over the bounces", BOUNCES)
+    bounces: str = choice("polarized", "which reflectance is summed over the bounces", BOUNCES)
     albedo: Colour = microfacet.albedo_factor("factor on all reflected and transmitted light")
 
     preset_kind: ClassVar[str] = "medium"

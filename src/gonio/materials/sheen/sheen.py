@@ -39,8 +39,8 @@ class Sheen(BSDF):
 
     D is a linearly transformed cosine (Heitz2016a), fitted to random walks in a layer of lossless microflakes of unit
     density and thickness, so it includes all orders of scattering. R is the albedo of the layer: the rest of the light
-    passes to the surface below, which this model does not include. The color is only a factor, while absorbing fibers
-    would tint later bounces more. Sampling is exact: every weight is albedo R.
+    passes to the surface below, which this model does not include. The color is only a scale factor, although absorbing
+    fibers would tint later bounces more. Sampling is exact: every sample has the weight albedo R.
 
     The fit depends on wo only, so the model is not reciprocal. Its table has 32 x 32 nodes, interpolated linearly.
     """

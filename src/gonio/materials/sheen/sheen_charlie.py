@@ -25,13 +25,13 @@ class SheenCharlie(BSDF):
     """Cloth of upright fibers: f = albedo D G / (4 (n.o)(n.i)), "Charlie" sheen (Estevez2017).
 
     D = (2 + 1 / alpha) sin(theta_m)^(1 / alpha) / (2 pi), which has its peak at the horizon instead of the normal
-    G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), with mu = cos theta and Lambda = exp L(mu), where the paper fits L
+    G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), with mu = cos theta and Lambda = exp L(mu), L fitted in the paper
 
     The softened terminator of the paper is omitted, because it is not reciprocal. There is no Fresnel term, and only
-    single scattering: at normal incidence, the model reflects a fifth of the light at alpha = 1 and a thousandth at
-    alpha = 0.1. The rest passes to the cloth below, which this model does not include. This is the sheen of glTF, with
-    alpha the square of glTF's roughness. For alpha below 0.07, the model reflects more light than it receives near the
-    horizon. Sampled by a guide.
+    single scattering is modeled: at normal incidence, the model reflects a fifth of the light at alpha = 1 and a
+    thousandth at alpha = 0.1. The rest passes to the cloth below, which this model does not include. This is the sheen
+    of glTF, with alpha the square of glTF's roughness. For alpha below 0.07, the model reflects more light than it
+    receives near the horizon. It is sampled by a guide (a tabulated density).
     """
 
     albedo: Colour = spectrum(default=1.0, doc="factor on all reflected light", low=0.0, high=1.0, soft_high=True)
@@ -39,7 +39,7 @@ class SheenCharlie(BSDF):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "for alpha below 0.07, the fit of Lambda masks too little: the albedo exceeds 1 at 89 degrees",
+            "for alpha below 0.07, the fit of Lambda gives too little masking: the albedo exceeds 1 at 89 degrees",
             lambda model: _gain(model),
             certain=False,
         )

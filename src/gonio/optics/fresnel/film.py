@@ -20,8 +20,8 @@ from .film_fourier import in_fourier_space
 from .polarization import Diattenuation
 
 FORMS = {
-    "local": "the sum of waves at 20 wavelengths, seen under D65 (locally spectral, OpenPBR)",
-    "belcour-barla": "the interference as Gaussians in Fourier space (Belcour2017)",
+    "local": "interference evaluated at 20 wavelengths and converted to RGB under D65 (locally spectral, OpenPBR)",
+    "belcour-barla": "interference in Fourier space, with Gaussian fits of the color matching functions (Belcour2017)",
 }
 
 # 390 to 770 nm in steps of 20: the fringes of a 1 um film are 100 nm apart, those of a 3 um film 35 nm

@@ -7,7 +7,7 @@ from .base import Fresnel, R, r0_conductor, r0_dielectric
 
 
 class Schlick(Fresnel):
-    """Schlick's approximation (Schlick1994) with R0 of the exact equations at normal incidence."""
+    """Schlick's approximation (Schlick1994) with R0 from the exact equations at normal incidence."""
 
     name = "schlick"
 

@@ -8,7 +8,7 @@ from .base import Masking
 
 
 class SmithSeparable(Masking):
-    """Smith G1 G1 (Walter2007); Beckmann by its rational fit.
+    """Smith G1 G1 (Walter2007); for Beckmann, with Walter's rational fit.
 
     As in the course sheet and Mitsuba, G1 is the customary form of the distribution; for Beckmann, eq. 8 of the sheet.
     """
