@@ -228,6 +228,14 @@ def test_the_width_of_a_base_under_a_coat_can_be_fitted() -> None:
     assert found.numbers == pytest.approx(0.4, rel=2e-3)
 
 
+def test_a_sum_inside_another_material_is_no_sum() -> None:
+    """The + of "coat(base=lambert+ggx)" parted the text into "coat(base=lambert" and "ggx)"."""
+    paths = [one.path for one in moving_of("oren-nayar+coat(base=lambert+ggx,index=1.4)")[1]]
+    assert {"a.albedo", "b.base.a.albedo", "b.base.b.eta", "b.alpha"} <= set(paths)
+    assert "b.index" not in paths
+    assert [one.path for one in moving_of("lambert(albedo=5e-1)+ggx(alpha=1e-1)")[1]] == ["b.eta"]
+
+
 def test_arrays_of_pairs_can_be_fitted() -> None:
     listed = _listed(PLASTIC, 0.02, 3)
     wo, wi = listed.pairs()

@@ -95,18 +95,25 @@ def split(text: str) -> tuple[str, str]:
     return (match[1].strip(), match[2] or "") if match else (text, "")
 
 
-def summands(text: str) -> list[str]:
-    """The parts of a sum of materials, "lambert+ggx", with the lobes of `LOBES` written out; empty for other strings.
-    A + inside brackets, as in 1e+5, or in a file name does not separate parts."""
+def terms(text: str) -> list[str]:
+    """The parts of a string between the signs of a sum, "lambert+ggx". A + inside brackets or in a file name does not
+    separate parts."""
+    if documents.names_document(text) or outside.names_data(text):
+        return [text.strip()]
     parts, depth = [""], 0
-    for letter in text if "+" in text else "":
+    for letter in text:
         depth += (letter in "([{") - (letter in ")]}")
         if letter == "+" and depth == 0:
             parts.append("")
         else:
             parts[-1] += letter
-    parts = [part.strip() for part in parts]
-    if len(parts) < 2 or not all(parts) or documents.names_document(text) or outside.names_data(text):
+    return [part.strip() for part in parts]
+
+
+def summands(text: str) -> list[str]:
+    """The parts of a sum of materials, with the lobes of `LOBES` written out; empty for other strings."""
+    parts = terms(text)
+    if len(parts) < 2 or not all(parts):
         return []
     return list(map(expanded, parts)) if any(_is_known(split(part)[0]) for part in parts) else []
 

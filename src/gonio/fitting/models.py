@@ -44,7 +44,7 @@ def modelled(text: str, lobes: int = 1) -> Model:
     """
     if lobes < 1:
         raise InputError(f"{lobes} lobes given, at least 1 expected", "lobes")
-    parts = [part.strip() for part in text.split("+")]
+    parts = texts.terms(text)
     if not all(parts):
         raise InputError(f"'{text}' is not a sum of materials", "model", 'such as "lambert+ggx"')
     parts += parts[-1:] * (lobes - 1)

@@ -20,11 +20,10 @@ import numpy as np
 from ...errors import InputError
 from ...optics.frame import spherical_array
 from ..tables.base import Floats, Measurement, in_rgb
-from ..tables.samples import Samples, sampled
+from ..tables.samples import UNIT, Samples, sampled
 from . import text
 from .base import Format
 
-UNIT = 1e-3  # largest deviation of a direction's length from 1
 RADIANS = 1.6  # largest theta, and a quarter of the largest phi, of a file whose angles are probably in radians
 ANGLES = ("theta_o", "phi_o", "theta_i", "phi_i")
 WIDTHS = {5: 4, 7: 6, 9: 6}  # columns of a file without names -> columns of its directions
