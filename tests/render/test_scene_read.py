@@ -210,6 +210,7 @@ WRONG = [
     ("/scene/shapes/0", "sphere", None, "expected an object", "{ }"),
     ("/output", "ball.exr", None, "expected an object", '{"filename": "ball.exr"}'),
     ("/integrator", "path", None, "expected an object", '{"type": "path"}'),
+    ("/scene/shapes/0/material", "lambert+ggx", None, "expected an object", '{"type": "sum", "a": {...}'),
     ("/scene/acceleration", "bhv", None, "expected 'embree'", "did you mean 'bvh'"),
     ("/scene/lights/0/energy", [-1, 0, 0], "/scene/lights/0/energy/0", "expected a number >= 0", ">= 0"),
     ("/scene/lights/0/energy", "5", None, "got the string '5'", "without quotes"),

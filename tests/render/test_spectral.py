@@ -65,6 +65,20 @@ def rendered(folder: Path, described: Mapping[str, object], **how: Any) -> np.nd
     return np.asarray(go.render(file, **how), float)
 
 
+def test_a_color_of_at_most_1_is_the_same_at_all_points() -> None:
+    """The tables of a coat are computed once, and the texture of such a color was taken for a varying one."""
+    _spectral()
+    metal = {"type": "gonio_conductor", "alpha": 0.3}
+    metal |= {name: {"type": "rgb", "value": [value] * 3} for name, value in (("eta", 0.5), ("k", 0.8))}
+    coated = mi.load_dict({"type": "gonio_coat", "base": metal, "index": 1.4})
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wavelengths = type(si.wavelengths)(450.0, 500.0, 550.0, 600.0)
+    si.wi = mi.Vector3f(0.6, 0.0, 0.8)
+    value = np.array(coated.eval(mi.BSDFContext(), si, mi.Vector3f(0.0, 0.6, 0.8)))
+    expected = go.Coat(base=go.Conductor(eta=0.5, k=0.8, alpha=0.3), index=1.4).eval([0.6, 0, 0.8], [0, 0.6, 0.8])
+    np.testing.assert_allclose(value.ravel(), expected[0, 0], rtol=0.01)
+
+
 # ---------------------------------------------------------------------- dispersion
 
 

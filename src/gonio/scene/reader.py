@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from ..bridge.types import Json
-from ..catalog import outside
+from ..catalog import outside, texts
 from ..errors import InputError, did_you_mean
 from . import overrides as override
 from .materials import BY_TYPE, OWN, MaterialPart, numbers_in
@@ -276,6 +276,8 @@ def _as_object(value: Json) -> str:
     name, bracket, _ = value.partition("(")
     if outside.names_code(value):
         return f'write {{"type": "{value}"}}, and allow it with --allow-code'
+    if texts.summands(value):
+        return 'write {"type": "sum", "a": {...}, "b": {...}}, with an object for each part'
     if name in BY_TYPE:
         return f'write {{"type": "{name}"{", ..." if bracket else ""}}}, with its parameters as keys'
     return f'write {{"type": "{_type_of(value)}", "file": "{value}"}}' if Path(value).suffix and not bracket else ""

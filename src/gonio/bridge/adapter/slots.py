@@ -69,10 +69,15 @@ class Slot:
                 raise InputError(f"'{props[name]}' given, a number or a texture expected", self.location)
             if given in (kinds.Float, kinds.Integer):
                 return self._constant(name, float(props[name]))
-            # Mitsuba's own conversion of colors to spectra is exact for reflectances, and clamps an index to 1
-            if given == kinds.Color and (not variant.spectral or np.max(np.asarray(props[name])) > 1.0):
+            if given == kinds.Color:
                 color = np.asarray(props[name], dtype=float).ravel()
-                return self._through_rgb(name, color) if variant.spectral else self._constant(name, color)
+                if not variant.spectral:
+                    return self._constant(name, color)
+                # Mitsuba's own conversion of colors to spectra is exact for reflectances, and clamps an index to 1
+                if np.max(color) > 1.0:
+                    return self._through_rgb(name, color)
+                self._texture(name, props.get_unbounded_texture(name))
+                return color  # it does not vary over the surface
             return self._texture(name, props.get_unbounded_texture(name))
         if parameter.required and name not in preset.values:
             raise InputError("missing", self.location, parameter.doc)
