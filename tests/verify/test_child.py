@@ -247,6 +247,26 @@ def test_the_parent_starts_the_child_before_it_loads_anything() -> None:
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == ""
 
 
+STUCK = """
+import threading, time
+from gonio.verify.isolation import watch
+watch.GRACE = 0.2
+def stuck(limit):
+    with watch.limited(f"law of {limit} s", limit):
+        time.sleep(60)
+with watch.limited("law that ends", 0.4):
+    threading.Thread(target=stuck, args=[9.0]).start()  # the later deadline is set first
+threading.Thread(target=stuck, args=[0.6]).start()
+"""
+
+
+def test_a_process_without_a_parent_ends_when_a_kernel_does_not() -> None:
+    """No signal reaches a loop in a kernel, as none reaches a thread that sleeps."""
+    done = subprocess.run([sys.executable, "-c", STUCK], capture_output=True, text=True, timeout=30)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("error: law of 0.6 s: not finished after 0.6 s")
+
+
 def test_no_target_is_an_empty_report() -> None:
     assert verify([], quick=True).passed
 

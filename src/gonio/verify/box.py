@@ -263,10 +263,10 @@ def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
     sized = []
     for share in (50.0, 90.0):
         size = np.percentile(bend, share, axis=1)
-        for i in range(len(size)):
+        for i in np.flatnonzero(size > MIN_JUMP).tolist():
             near = np.concatenate([size[max(i - 5, 0) : max(i - 1, 0)], size[i + 2 : i + 6]])
             usual = float(np.median(near)) if len(near) else 0.0
-            if size[i] > MIN_JUMP and size[i] > JUMP * usual:
+            if size[i] > JUMP * usual:
                 sized.append((float(size[i]) / (1.0 if share == 50.0 else 2.0), i + 1))
                 sized.append((float(size[i]) / (1.01 if share == 50.0 else 2.02), i + 2))
     return [(size, min(at, SCAN - 1)) for size, at in sized]

@@ -86,11 +86,11 @@ def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cell
             heights, turns = height(mine), pseudo_angle(mine)
             order = np.argsort(heights)
             heights, turns = heights[order], turns[order]
-            rows[i, j] = _edges(heights, 0.0, 1.0, many_rows)
-            for r, (a, b) in enumerate(zip(rows[i, j][:-1], rows[i, j][1:], strict=True)):
-                first, last = np.searchsorted(heights, [a, b])
-                more = max(300 - (last - first), 0) // 2  # a row with few samples also uses those of its neighbors
-                columns[i, j, r] = _edges(turns[max(first - more, 0) : last + more], 0.0, 4.0, many_columns)
+            rows[i, j] = _edges([heights], 0.0, 1.0, many_rows)[0]
+            first, last = np.searchsorted(heights, [rows[i, j][:-1], rows[i, j][1:]])
+            more = np.maximum(300 - (last - first), 0) // 2  # a row with few samples also uses those of its neighbors
+            parts = zip(np.maximum(first - more, 0), last + more, strict=True)
+            columns[i, j] = _edges([turns[slice(*part)] for part in parts], 0.0, 4.0, many_columns)
     return Grid(wo, sides, rows, columns, pilot)
 
 
@@ -128,36 +128,40 @@ def azimuth(turn: np.ndarray) -> np.ndarray:
     return 0.5 * np.pi * quarter + np.arctan2(t, 1.0 - t)
 
 
-def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
-    """count + 1 edges on [low, high]: half of them at quantiles, a quarter evenly spaced, and a quarter at increasing
-    distances."""
-    inside = values[(values > low) & (values < high)]
-    if not len(inside):
-        return np.linspace(low, high, count + 1).astype(np.float32)
+def _edges(groups: Sequence[np.ndarray], low: float, high: float, count: int) -> np.ndarray:
+    """count + 1 edges on [low, high] for the values of each group, (groups, count + 1): half of them at quantiles, a
+    quarter evenly spaced, and a quarter at increasing distances."""
+    inside = [np.sort(values[(values > low) & (values < high)]) for values in groups]
+    sizes = np.array([len(values) for values in inside])
     even, far = count // 4 - 2, count // 4
     many = count - 1 - even - far
-    own = np.sort(inside)[np.arange(many) * (len(inside) - 1) // (many - 1)]
-    first, middle, last = own[many // 4], own[many // 2], own[3 * many // 4]
-    edges = np.full(count + 1, high)
-    edges[:many] = own
+    quantiles = np.arange(many) * np.maximum(sizes - 1, 0)[:, None] // (many - 1)
+    # a group without values reads that of another, and gets other edges below
+    place = (np.cumsum(sizes) - sizes)[:, None] + quantiles
+    own = np.append(np.concatenate(inside), low)[place]
+    first, middle, last = own[:, many // 4], own[:, many // 2], own[:, 3 * many // 4]
+    edges = np.full((len(groups), count + 1), high)
+    edges[:, :many] = own
     # a density that ends in a step has that step just beyond the outermost samples
-    edges[many : many + 2] = own[-1] + (own[-1] - own[-2]), own[0] - (own[1] - own[0])
-    edges[many + 2 : many + 2 + even] = low + (high - low) / (even + 1) * np.arange(1, even + 1)
+    edges[:, many] = own[:, -1] + (own[:, -1] - own[:, -2])
+    edges[:, many + 1] = own[:, 0] - (own[:, 1] - own[:, 0])
+    edges[:, many + 2 : many + 2 + even] = low + (high - low) / (even + 1) * np.arange(1, even + 1)
     tail = many + 2 + even
     for sign, reach in ((1, last - middle), (-1, middle - first)):
-        edges[tail : tail + far // 2] = middle + sign * _growing(reach, high - low, far // 2)
+        edges[:, tail : tail + far // 2] = middle[:, None] + sign * _growing(reach, high - low, far // 2)
         tail += far // 2
     # clipped tails leave several equal edges at an end: cells of zero width, with no samples and none expected
-    edges = np.sort(edges.clip(low, high))
-    edges[0], edges[-1] = low, high
+    edges = np.sort(edges.clip(low, high), axis=1)
+    edges[:, 0], edges[:, -1] = low, high
+    edges[sizes == 0] = np.linspace(low, high, count + 1)
     return edges.astype(np.float32)
 
 
-def _growing(first: float, last: float, count: int) -> np.ndarray:
-    """Distances in geometric progression, up to a ratio of at least 1e4, since the tail of a lobe of width 1e-4 extends
-    to a million times its height."""
-    first = max(first, 1e-10)
-    return first * max(last / first, 1e4) ** (np.arange(count) / max(count - 1, 1))
+def _growing(first: np.ndarray, last: float, count: int) -> np.ndarray:
+    """Distances in geometric progression, (groups, count), up to a ratio of at least 1e4, since the tail of a lobe of
+    width 1e-4 extends to a million times its height."""
+    first = np.maximum(first, 1e-10)[:, None]
+    return np.asarray(first * np.maximum(last / first, 1e4) ** (np.arange(count) / max(count - 1, 1)))
 
 
 def boxes(rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -146,18 +146,16 @@ def _integrate(
     for depth in range(DEPTH):
         fine_cells = cells.quarters(way)
         (inner, other), ways = _values(integrand, wo, fine_cells, _GAUSS, _RIMMED)
-        fine = inner.integral.reshape(-1, 4, channels)
-        so_far = np.stack([value, value])
-        for total, part in zip(so_far, (coarse, fine.sum(1)), strict=True):
-            np.add.at(total, cells.row, part)
+        fine = _joined(inner.integral)
+        so_far = [value + _by_row(cells.row, part, len(wo)) for part in (coarse, fine)]
         # a gain of a thousand need not be known to 1e-5; a light that one of the two rules hits by chance is no gain
-        scale = np.maximum(np.abs(so_far).max(2).min(0), 1.0)
+        scale = np.maximum(np.minimum(*[np.abs(total).max(1) for total in so_far]), 1.0)
         allowed = (tolerance / 400.0 * scale)[cells.row]  # some hundreds of cells contribute to an integral's error
         # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them,
         # and all of Gauss's rules if it is near their rim
-        signed = np.stack([coarse, other.integral.reshape(-1, 4, channels).sum(1)]) - fine.sum(1)
-        difference = np.abs(signed).max(0)
-        difference += 0.02 * step_aside(inner, other).reshape(-1, 4, 1).sum(1)  # errors of steps partly cancel
+        signed = np.stack([coarse, _joined(other.integral)]) - fine
+        difference = np.maximum(*np.abs(signed))
+        difference += 0.02 * _joined(step_aside(inner, other)[:, None])  # errors of steps partly cancel
         small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance * scale
         divide = (difference.max(1) > allowed) & ~small[cells.row]
         missed = points.missed_by(cells.area, 4.0 * inner.most.reshape(-1, 4).max(1))
@@ -171,7 +169,7 @@ def _integrate(
         if depth == DEPTH - 1 or 16 * divide.sum() > MAX_CELLS:
             divide[:] = False
         done = ~divide
-        np.add.at(value, cells.row[done], fine[done].sum(1))
+        value += _by_row(cells.row[done], fine[done], len(wo))
         errors = errors.with_cells(cells.row[done], signed[:, done], difference[done])
         if not divide.any():
             break
@@ -180,8 +178,18 @@ def _integrate(
         cells, way = fine_cells.take(next_), ways[next_]
         way[points.missed_by(cells.area, inner.most[next_]) > 0.0] = QUADRANTS
         shown = np.repeat(shown[divide], 4)
-        coarse = fine[divide].reshape(-1, channels)
+        coarse = inner.integral[next_]
     return value, errors.total(), unseen
+
+
+def _joined(quarters: np.ndarray) -> np.ndarray:
+    """The sums (M, C) of values (4 M, C) over the four quarters of each cell, ten times as fast as by `sum`."""
+    return quarters[0::4] + quarters[1::4] + quarters[2::4] + quarters[3::4]
+
+
+def _by_row(row: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """The sums (count, C) of the values (M, C) of cells, by the index (M,) of their wo."""
+    return np.stack([np.bincount(row, column, count) for column in values.T], -1)
 
 
 class _Errors:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import math
 import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
@@ -44,10 +47,8 @@ def limited(what: str, seconds: float | None = None) -> Iterator[None]:
         os._exit(2)
 
     by_signal = hasattr(signal, "SIGALRM") and threading.current_thread() is threading.main_thread()
-    last = threading.Timer(seconds + GRACE, give_up)
-    last.daemon = True
     if not watched:
-        last.start()
+        _watchdog().add(give_up, seconds + GRACE)
     if by_signal:
         before = signal.signal(signal.SIGALRM, ring)
         signal.setitimer(signal.ITIMER_REAL, seconds)
@@ -57,4 +58,41 @@ def limited(what: str, seconds: float | None = None) -> Iterator[None]:
         if by_signal:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, before)
-        last.cancel()
+        if not watched:
+            _watchdog().remove(give_up)
+
+
+class _Watchdog(threading.Thread):
+    """A thread that calls functions at their deadlines. One for all: to start a thread takes longer than many a law."""
+
+    def __init__(self) -> None:
+        super().__init__(name="gonio watchdog", daemon=True)
+        self.deadlines: dict[Callable[[], None], float] = {}
+        self.wakes = math.inf
+        self.changed = threading.Condition()
+
+    def add(self, function: Callable[[], None], seconds: float) -> None:
+        with self.changed:
+            self.deadlines[function] = time.monotonic() + seconds
+            if self.deadlines[function] < self.wakes:
+                self.changed.notify()
+
+    def remove(self, function: Callable[[], None]) -> None:
+        with self.changed:
+            self.deadlines.pop(function, None)
+
+    def run(self) -> None:
+        with self.changed:
+            while True:
+                for function in [one for one, end in self.deadlines.items() if end <= time.monotonic()]:
+                    del self.deadlines[function]
+                    function()
+                self.wakes = min(self.deadlines.values(), default=math.inf)
+                self.changed.wait(min(self.wakes - time.monotonic(), threading.TIMEOUT_MAX))
+
+
+@functools.cache
+def _watchdog() -> _Watchdog:
+    watchdog = _Watchdog()
+    watchdog.start()
+    return watchdog
