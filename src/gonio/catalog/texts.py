@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..material import is_model, model, tree
 from ..material.bsdf import BSDF
 from ..material.parameters import Value
+from ..optics.ndf import distributions
 from . import documents, library, outside, shaders
 
 # lobes as parts of a sum, "lambert+ggx": Schlick's Fresnel term of an index without absorption
@@ -211,8 +212,12 @@ def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
         return outside.load(name, where=where), ""
     if shaders.names_shader(name):
         return shaders.class_of(name), ""
-    if not is_model(name) and (":" in name or library.resembles(name)):
-        return library.named(name, where)
+    if not is_model(name):
+        if name in distributions():
+            hint = f"as a material: conductor(ndf={name})"
+            raise InputError(f"'{name}' is a distribution of normals, a material expected", where, hint)
+        if ":" in name or library.resembles(name):
+            return library.named(name, where)
     return model(name), ""
 
 

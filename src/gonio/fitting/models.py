@@ -54,13 +54,22 @@ def modelled(text: str, lobes: int = 1) -> Model:
         material, stated = notation.named(texts.expanded(part))[0], texts.assignments(notation.split(part)[1])
         paths = {leaf.path for leaf in tree.leaves(material)}
         given = [path for path in stated if path in paths]  # not a preset, whose values are where the fit starts
-        made.append(Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {})))
+        own = Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {}))
+        for path, value in stated.items():
+            if isinstance(getattr(material, path, None), BSDF):  # a material inside: coat(base=lambert+ggx)
+                own = _with_constraints(own, path, modelled(value))
+        made.append(own)
     combined = made[0]
     for other in made[1:]:
-        fixed = (*(f"a.{path}" for path in combined.fixed), *(f"b.{path}" for path in other.fixed))
-        least = {f"a.{p}": v for p, v in combined.least.items()} | {f"b.{p}": v for p, v in other.least.items()}
-        combined = Model(Sum(combined.material, other.material), fixed, least)
+        both = Model(Sum(combined.material, other.material))
+        combined = _with_constraints(_with_constraints(both, "a", combined), "b", other)
     return combined
+
+
+def _with_constraints(model: Model, path: str, inner: Model) -> Model:
+    """A model whose material at `path` has the fixed parameters and lower bounds of another model."""
+    fixed = (*model.fixed, *(f"{path}.{one}" for one in inner.fixed))
+    return Model(model.material, fixed, {**model.least, **{f"{path}.{one}": low for one, low in inner.least.items()}})
 
 
 def moving_of(

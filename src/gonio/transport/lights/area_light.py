@@ -69,7 +69,7 @@ def _light_class(mi: ModuleType) -> OfVariant:
             shape = self.get_shape()
             if is_rectangle(mi, shape):
                 ds = direction_sample(mi, SphericalRectangle(Rectangle.of(mi, shape), it.p), sample, it)
-            elif is_sphere(mi, shape):  # Mitsuba's samples have a wrong uv, and let a sphere illuminate itself
+            elif is_sphere(mi, shape):  # Mitsuba's samples have a wrong uv, and are too bright for small spheres
                 ds = direction_sample(mi, SphericalCap(mi, Ball.of(mi, shape), it.p), sample, it)
             else:  # Mitsuba's sampling of meshes omits points whose normal faces away
                 ds = area_sample(mi, shape.sample_position(it.time, sample, active), it)
