@@ -81,7 +81,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Exit codes: 0 done, 1 verdict fails, 2 bad usage or input, 3 fault of the machine, 130 Ctrl-C.",
+    epilog="Exit codes: 0 success, 1 failed verdict, 2 bad usage or input, 3 machine fault, 130 Ctrl-C.",
 )
 
 
@@ -98,7 +98,7 @@ def gonio(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Print the full traceback if an error occurs.")] = False,
 ) -> None:
     """A laboratory for the scattering of light by materials."""
     if debug:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def output_option(metavar: str, text: str) -> OptionInfo:
-    """`-o`, the option for the output of a verb: `Annotated[Path, output_option("FILE", "The sheet.")]`."""
+    """`-o`, the option for the output of a verb: `Annotated[Path, output_option("FILE", "File for the sheet.")]`."""
     return Option("-o", "--output", metavar=metavar, help=text)
 
 
@@ -45,10 +45,13 @@ def render_option(name: str) -> OptionInfo:
 
 
 Model = Annotated[
-    str, Argument(metavar="MODEL", help="A material; `gonio models` lists them.", autocompletion=completion.materials)
+    str, Argument(metavar="MODEL", help="Material, as listed by `gonio models`.", autocompletion=completion.materials)
 ]
 SceneFile = Annotated[
-    str, Argument(metavar="SCENE", help="A scene: its folder, .json or Mitsuba .xml; or a material, shown on a ball.")
+    str,
+    Argument(
+        metavar="SCENE", help="Scene folder, scene file (.json or Mitsuba .xml), or a material to show on a ball."
+    ),
 ]
 Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 Outside = Annotated[bool, render_option("allow_outside")]
@@ -58,9 +61,12 @@ Threads = Annotated[int | None, render_option("threads")]
 Seed = Annotated[int | None, render_option("seed")]
 Spp = Annotated[int | None, render_option("spp")]
 Exposure = Annotated[str, render_option("exposure")]
-Timeout = Annotated[float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")]
+Timeout = Annotated[
+    float | None,
+    Option(metavar="S", help="Time limit in seconds; the picture rendered up to then is written."),
+]
 Checkpoint = Annotated[
-    Path | None, Option(metavar="FILE", help="Store intermediate sums in FILE; resume from it if it exists.")
+    Path | None, Option(metavar="FILE", help="File for intermediate results; if it exists, the render resumes from it.")
 ]
 
 
@@ -88,11 +94,16 @@ class Reading(Options):
 
     define: Annotated[
         list[str] | None,
-        Option("--define", "-D", metavar="NAME=VALUE", help="Set a macro or override of a shader; repeatable."),
+        Option(
+            "--define",
+            "-D",
+            metavar="NAME=VALUE",
+            help="Value of a macro or override constant of a shader; repeatable.",
+        ),
     ] = None
     adapter: Annotated[
         list[str] | None,
-        Option(metavar="KEY=VALUE", help="Set an entry of a shader's adapter, such as function=BRDF; repeatable."),
+        Option(metavar="KEY=VALUE", help="Entry of a shader's adapter, such as function=BRDF; repeatable."),
     ] = None
 
     def shaders(self, texts: Sequence[str]) -> list[str]:
@@ -119,10 +130,16 @@ class Material(Reading):
     """Parameters and preset of the materials named on the command line."""
 
     param: Annotated[
-        list[str] | None, Option("--param", "-p", metavar="NAME=VALUE", help="Set a parameter; repeatable.")
+        list[str] | None,
+        Option("--param", "-p", metavar="NAME=VALUE", help="Value of a parameter, such as alpha=0.3; repeatable."),
     ] = None
     preset: Annotated[
-        str, Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets)
+        str,
+        Option(
+            metavar="NAME",
+            help="Named preset of the material, such as Au for conductor.",
+            autocompletion=completion.presets,
+        ),
     ] = ""
 
     def texts(self, models: Sequence[str], accepted: Collection[operands.Kind] = ()) -> list[str]:
@@ -185,9 +202,12 @@ class Fitting(Material):
     further ones."""
 
     free: Annotated[
-        list[str] | None, Option(metavar="NAME", help="Also fit this parameter, even if it is 1; repeatable.")
+        list[str] | None,
+        Option(metavar="NAME", help="Parameter to fit, even if it is a scale factor of 1; repeatable."),
     ] = None
-    grazing: Annotated[float, Option(metavar="DEG", help="Ignore values beyond this angle from the normal.")] = 80.0
+    grazing: Annotated[
+        float, Option(metavar="DEG", help="Largest angle from the normal, in degrees; values beyond it are ignored.")
+    ] = 80.0
 
     def fixed(self) -> dict[str, str]:
         """The fixed parameters by path, as strings."""
@@ -215,9 +235,11 @@ class Executor(Options):
     """Options that determine where parts are computed: in this process, in several processes on this machine, or on a
     cluster."""
 
-    workers: Annotated[int | None, Option(metavar="N", help="Compute with N processes on this machine.")] = None
+    workers: Annotated[int | None, Option(metavar="N", help="Number of processes to compute with on this machine.")] = (
+        None
+    )
     cluster: Annotated[
-        str | None, Option(metavar="ADDRESS", help="Compute on a Dask cluster, such as tcp://host:8786.")
+        str | None, Option(metavar="ADDRESS", help="Address of a Dask cluster to compute on, such as tcp://host:8786.")
     ] = None
 
     def running(self) -> AbstractContextManager[object]:

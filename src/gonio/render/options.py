@@ -26,17 +26,25 @@ class RenderOptions:
 
     spp: Annotated[int | None, Shown("N", "Samples per pixel.")] = None
     size: Annotated[tuple[int, int] | None, Shown("WxH", "Film size in pixels, such as 640x480.")] = None
-    integrator: Annotated[str | None, Shown("NAME", "direct, path, caustics, light, normal, ...")] = None
-    max_depth: Annotated[int | None, Shown("N", "Maximum path length, of path, caustics, light.")] = None
-    sampler: Annotated[str | None, Shown("NAME", "Random points: sobol, independent, ...")] = None
+    integrator: Annotated[str | None, Shown("NAME", "Integrator: direct, path, caustics, light, normal, ...")] = None
+    max_depth: Annotated[
+        int | None, Shown("N", "Maximum path length, for the integrators path, caustics and light.")
+    ] = None
+    sampler: Annotated[str | None, Shown("NAME", "Sampler of random numbers: sobol, independent, ...")] = None
     seed: Annotated[int | None, Shown("N", "Seed of all random numbers; the same seed gives the same result.")] = None
-    device: Annotated[str, Shown("cpu|cuda|auto", "Where to compute.")] = "cpu"
-    spectral: Annotated[bool, Shown("", "Trace wavelengths, so that glass disperses.")] = False
-    threads: Annotated[int | None, Shown("N", "CPU cores to use; all by default.")] = None
+    device: Annotated[str, Shown("cpu|cuda|auto", "Device to compute on; auto selects cuda if it is available.")] = (
+        "cpu"
+    )
+    spectral: Annotated[bool, Shown("", "Render with wavelengths instead of RGB, so that glass disperses light.")] = (
+        False
+    )
+    threads: Annotated[int | None, Shown("N", "Number of CPU cores to use; all by default.")] = None
     denoise: Annotated[bool, Shown("", "Remove noise with Open Image Denoise.")] = False
-    exposure: Annotated[float | Literal["auto"], Shown("EV|auto", "Brightness of a .png, in stops.")] = 0.0
+    exposure: Annotated[
+        float | Literal["auto"], Shown("EV|auto", "Exposure of a .png file in stops; auto derives it from the picture.")
+    ] = 0.0
     allow_outside: Annotated[bool, Shown("", "Allow the scene to read files outside its folder.")] = False
-    allow_code: Annotated[bool, Shown("", "Allow the scene to run the Python files and plugins it names.")] = False
+    allow_code: Annotated[bool, Shown("", "Allow the scene to run the Python files and plugins that it names.")] = False
 
 
 class RenderKeywords(TypedDict, total=False):

@@ -19,20 +19,25 @@ def adopt(
         Path,
         Argument(
             metavar="FILE",
-            help="A shader: .glsl, .frag, .hlsl, .slang, .wgsl, .spv or .brdf; or the folder of an engine.",
+            help="Shader (.glsl, .frag, .hlsl, .slang, .wgsl, .spv or .brdf), or the folder of an engine's package.",
         ),
     ],
     *,
     how: Reading,
-    output: Annotated[Path | None, output_option("DIR", "For a package: the folder to write.")] = None,
-    tsl: Annotated[bool, Option("--tsl", help="three.js: its TSL build too, by running its JavaScript.")] = False,
-    force: Annotated[bool, Option("--force", help="Replace an existing adapter.")] = False,
+    output: Annotated[
+        Path | None, output_option("DIR", "Folder for the shaders of an engine; by default named after its package.")
+    ] = None,
+    tsl: Annotated[
+        bool, Option("--tsl", help="Also adopt the TSL build of three.js, by running its JavaScript.")
+    ] = False,
+    force: Annotated[bool, Option("--force", help="Replace existing files.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write the adapter of a shader, FILE.toml: which function is the BRDF, and what its arguments mean.
+    """Write an adapter that states which function of a shader is its BRDF, and what the arguments mean.
 
-    The adapter is a first guess from the names of functions, arguments and uniforms; the guesses are printed. For the
-    folder of an engine's npm package, or of a checkout, write shaders that include its code, with their adapters.
+    The adapter, FILE.toml, is a first guess based on the names of functions, arguments and uniforms; the guesses are
+    printed. If FILE is the folder of an engine, either an npm package or a checkout of its repository, shaders that
+    include the engine's code are written instead, with their adapters.
 
     \b
     Examples:

@@ -17,35 +17,56 @@ from .base import MATERIALS, verb
 class Baking(Options):
     """The tables to bake, and the method."""
 
-    lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,ltc,prefiltered", help="The tables to bake.")] = ""
-    resolution: Annotated[int | None, Option(metavar="N", help="Texels along each axis; 128, for ltc 64 or 16.")] = None
-    method: Annotated[str, Option(metavar="NAME", help="Integrate by quadrature, cosine, ggx, visible, ...")] = (
-        "quadrature"
-    )
-    masking: Annotated[
-        str | None, Option(metavar="NAME", help="Masking term of a distribution: smith-correlated, ..., FILE.py:CLASS.")
+    lut: Annotated[
+        str, Option(metavar="E,Eavg,dfg,glass,ltc,prefiltered", help="Tables to bake, separated by commas.")
+    ] = ""
+    resolution: Annotated[
+        int | None,
+        Option(metavar="N", help="Number of texels along each axis; 128 by default, for ltc 64 (anisotropic: 16)."),
     ] = None
-    samples: Annotated[int, samples_option("Random samples per texel, for methods that sample.")] = 1024
+    method: Annotated[
+        str,
+        Option(
+            metavar="NAME", help="Integration method: quadrature, or the density to sample (cosine, ggx, visible, ...)."
+        ),
+    ] = "quadrature"
+    masking: Annotated[
+        str | None,
+        Option(metavar="NAME", help="Masking term of a distribution, such as smith-correlated or FILE.py:CLASS."),
+    ] = None
+    samples: Annotated[int, samples_option("Number of random samples per texel, for methods that sample.")] = 1024
     sampler: Annotated[
-        str, Option(metavar="NAME", help="Points of these methods: hammersley, stratified, independent.")
+        str, Option(metavar="NAME", help="Sampler for methods that sample: hammersley, stratified or independent.")
     ] = "hammersley"
     seed: Seed = None
-    layout: Annotated[str, Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear"
+    layout: Annotated[
+        str,
+        Option(
+            metavar="linear|stretched|homework",
+            help="Layout of the axes; homework also writes the pictures of homework 4.",
+        ),
+    ] = "linear"
     aspect: Annotated[
-        float | None, Option(metavar="A", help="alpha_y / alpha_x of a distribution: adds the axis phi.")
+        float | None,
+        Option(
+            metavar="A", help="Ratio alpha_y / alpha_x of a distribution; a ratio other than 1 adds an azimuth axis."
+        ),
     ] = None
-    azimuths: Annotated[int, Option(metavar="N", help="Values along phi, for anisotropic tables.")] = 24
-    store: Annotated[str, Option(metavar="E|1-E", help="Homework: what the pictures hold.")] = "E"
-    flip: Annotated[bool, Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True
-    floor: Annotated[float, Option(metavar="X", help="Lower bound of D's denominator, for --method cosine.")] = 0.0
+    azimuths: Annotated[int, Option(metavar="N", help="Number of azimuths in anisotropic tables.")] = 24
+    store: Annotated[str, Option(metavar="E|1-E", help="Quantity that the pictures of --layout homework store.")] = "E"
+    flip: Annotated[
+        bool, Option("--flip/--no-flip", help="Put the lowest roughness at the bottom of the homework pictures.")
+    ] = True
+    floor: Annotated[float, Option(metavar="X", help="Lower bound of the denominator of D, for --method cosine.")] = 0.0
     wrap: Annotated[
-        bool, Option("--wrap", help="Homework: bytes as its program writes them, rounded down and wrapped at 256.")
+        bool, Option("--wrap", help="Round bytes down and wrap them at 256, as the homework's program does.")
     ] = False
     ndf: Annotated[
-        str | None, Option(metavar="NAME", help="Distribution that blurs an environment: ggx, ..., FILE.py:CLASS.")
+        str | None, Option(metavar="NAME", help="Distribution that blurs an environment, such as ggx or FILE.py:CLASS.")
     ] = None
     levels: Annotated[
-        int | None, Option(metavar="N", help="Maps of an environment, from roughness 0 to 1; 6 by default.")
+        int | None,
+        Option(metavar="N", help="Number of blurred maps of an environment, from roughness 0 to 1; 6 by default."),
     ] = None
 
 
@@ -65,28 +86,28 @@ def bake(
         str | None,
         Argument(
             metavar="TARGET",
-            help="A distribution (ggx, beckmann), a material, or an environment (.hdr, .exr).",
+            help="Distribution (ggx, beckmann), material, or environment (.hdr, .exr).",
             autocompletion=completion.materials_and_distributions,
         ),
     ] = None,
     *,
-    output: Annotated[Path, output_option("DIR", "Folder of the tables.")] = Path("tables"),
+    output: Annotated[Path, output_option("DIR", "Folder for the tables.")] = Path("tables"),
     made: Material,
     how: Baking,
     executor: Executor,
     as_json: Json = False,
 ) -> None:
-    """Write tables of directional albedo, its average, the split sum and rough glass, with their measured error.
+    """Write tables of directional albedo, its average, the split sum and rough glass, with their errors.
 
-    The homework's text uses k = (roughness + 1)^2 / 8, its figures use k = alpha / 2: --preset homework-text bakes the
-    first, --preset homework-figure the second, sampled as in the homework's picture.
+    The text of homework 4 uses k = (roughness + 1)^2 / 8, but its figures use k = alpha / 2. --preset homework-text
+    bakes the tables of the text, and --preset homework-figure bakes those of the figures, with the same sampling.
 
-    Tables of an anisotropic distribution have a third axis, the azimuth. A material without roughness gives E as a
-    function of the cosine. An environment gives its light blurred for each roughness, which the split sum multiplies by
-    the albedo.
+    Tables of an anisotropic distribution have a third axis, the azimuth. For a material without roughness, E is a
+    function of the cosine alone. For an environment, its light is blurred for each roughness; the split sum multiplies
+    this light by the albedo.
 
-    `--lut ltc` fits linearly transformed cosines to a material, and writes their error and the shader code of area
-    lights. For an anisotropic material, the tables have an axis for the azimuth and 16 texels along the others.
+    `--lut ltc` fits linearly transformed cosines to a material, and writes the tables, their error, and shader code for
+    area lights. Tables of an anisotropic material also have an azimuth axis, and by default 16 texels along the others.
 
     \b
     Examples:

@@ -21,28 +21,41 @@ if TYPE_CHECKING:
 @verb(MATERIALS, place=9)
 def capture(
     photographs: Annotated[
-        list[str], Argument(metavar="PHOTOS...", help="A folder with a calibration.json, or photographs that it lists.")
+        list[str],
+        Argument(
+            metavar="PHOTOS...", help="Folder with a calibration.json, or photographs that the calibration lists."
+        ),
     ],
     *,
     output: Annotated[
-        Path | None, output_option("FILE", "A table (.gonio, .binary, ...) or .json; a .png is written next to it.")
+        Path | None,
+        output_option("FILE", "Table (.gonio, .binary, ...) or fit (.json); a figure is written next to it."),
     ] = None,
     model: Annotated[
         list[str] | None,
-        Option("--model", "-m", metavar="NAME", help='Model to fit, such as "lambert+ggx"; several are ranked.'),
+        Option(
+            "--model",
+            "-m",
+            metavar="NAME",
+            help='Model to fit, such as "lambert+ggx"; repeatable, to rank several models.',
+        ),
     ] = None,
     how: Fitting,
     calibration: Annotated[
-        Path | None, Option(metavar="FILE", help="Positions of camera, sample, lamps; calibration.json by default.")
+        Path | None,
+        Option(metavar="FILE", help="Calibration file; by default calibration.json in the folder of the photographs."),
     ] = None,
-    next_: Annotated[int, Option("--next", metavar="N", help="Suggest lamp positions for the next N photographs.")] = 0,
+    next_: Annotated[
+        int, Option("--next", metavar="N", help="Number of further photographs for which to suggest lamp positions.")
+    ] = 0,
     as_json: Json = False,
 ) -> None:
     """Measure a material from photographs of a ball or a flat sample under a lamp.
 
-    The calibration file gives the positions of camera, sample and lamps with their uncertainty: docs/capture.md lists
-    its keys. A .json holds a fit, of lambert+ggx by default. With --next and a calibration that lists no photographs
-    yet, the first ones are planned for a material like the model.
+    The calibration file states the positions of the camera, the sample and the lamps, with their uncertainties;
+    docs/capture.md lists its keys. An output file with the suffix .json contains a fitted model, lambert+ggx by
+    default. If the calibration lists no photographs yet, --next plans the first ones for a material similar to the
+    model.
 
     \b
     Examples:

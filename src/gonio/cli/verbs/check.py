@@ -22,58 +22,60 @@ class Judging(Options):
     """Options of the judgment and of its report."""
 
     scene: Annotated[
-        Path | None, Option(metavar="FILE", help="The scene of a picture; with --sheet, a folder of scenes.")
+        Path | None, Option(metavar="FILE", help="Scene that the picture shows; with --sheet, a folder of scenes.")
     ] = None
     sheet: Annotated[
-        str | None, Option(metavar="hw4|lab2", help="The assignment sheet for a folder of submissions.")
+        str | None, Option(metavar="hw4|lab2", help="Assignment sheet, to check a folder of submissions.")
     ] = None
-    up: Annotated[str, Option(metavar="z|y|x", help="The axis along the normal in rows of directions.")] = "z"
+    up: Annotated[str, Option(metavar="z|y|x", help="Axis along the normal, for rows of directions.")] = "z"
     tolerance: Annotated[
-        float | None, Option(metavar="X", help="Relative difference of f that counts as equal; 0.002 for rows.")
+        float | None,
+        Option(metavar="X", help="Relative difference of f that counts as equal; by default 0.002 for rows of f."),
     ] = None
     hide_solution: Annotated[
-        bool, Option("--hide-solution", help="Print where a mistake is, without formulas and values of the solution.")
+        bool,
+        Option("--hide-solution", help="Print where a mistake is, but not the formulas and values of the solution."),
     ] = False
-    function: Annotated[str, Option(metavar="NAME", help="The function to judge in a shader.")] = ""
-    junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML.")] = None
+    function: Annotated[str, Option(metavar="NAME", help="Name of the function to check in a shader.")] = ""
+    junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="JUnit XML file for the verdicts.")] = None
 
 
 @verb(MATERIALS, place=3)
 def check(
     target: Annotated[
         str | None,
-        Argument(
-            metavar="WORK", help="A table (.png), rows of f (.csv), FILE.py:CLASS, a shader, a picture, or a folder."
-        ),
+        Argument(metavar="WORK", help="Table (.png), rows of f (.csv), FILE.py:CLASS, shader, picture, or folder."),
     ] = None,
     model: Annotated[
         str | None,
         Argument(
             metavar="MODEL",
-            help="The material to judge by; for a table of E, the masking term that it must have.",
+            help="Correct material; for a table of E, the masking term that it must have.",
             autocompletion=completion.materials,
         ),
     ] = None,
     *,
     how: Judging,
     made: Material,
-    against: Annotated[str | None, Option(metavar="MODEL", help="The same as MODEL.")] = None,
+    against: Annotated[
+        str | None, Option(metavar="MODEL", help="Correct material, given as an option instead of an argument.")
+    ] = None,
     reference: Annotated[
         Path | None,
         Option(
             metavar="DIR",
-            help="Write reference values there: f at 200 pairs for WORK, a material, or all of the courses.",
+            help="Folder for reference values of the material WORK, or of all models of the course.",
         ),
     ] = None,
     trust: Trust,
     as_json: Json = False,
 ) -> None:
-    """Judge a student's own work: right or wrong, how far off, and the probable mistake.
+    """Check a student's work: whether it is right, how large the error is, and what the probable mistake is.
 
-    A table of E or E_avg is compared with all forms that follow from the homework's text, its figures and the usual
-    mistakes. Rows of wo, wi and f from any program, and classes, are compared with MODEL pair by pair. A picture may be
-    shifted by up to two pixels, have another exposure, and be stored with or without gamma. The exit code is 0 if
-    everything is right, 1 if something is wrong or missing, 2 if something cannot be read.
+    A table of E or E_avg is compared with every form that follows from the homework's text, from its figures or from a
+    common mistake. Classes, and rows of wo, wi and f from any program, are compared with MODEL pair by pair. A picture
+    may be shifted by up to two pixels, have a different exposure, and be stored with or without gamma. The exit code is
+    0 if everything is right, 1 if something is wrong or missing, and 2 if something cannot be read.
 
     \b
     Examples:

@@ -21,13 +21,21 @@ if TYPE_CHECKING:
 class Judging(Options):
     """The metric, and the largest difference that passes."""
 
-    tolerance: Annotated[float | None, Option(metavar="X", help="Exit with 1 if the metric exceeds X.")] = None
+    tolerance: Annotated[
+        float | None,
+        Option(metavar="X", help="Largest accepted value of the metric; if it is exceeded, the exit code is 1."),
+    ] = None
     metric: Annotated[
         str | None,
-        Option(metavar="NAME", help="Metric of --tolerance: relmse, rmse, flip; for materials mean, largest, albedo."),
+        Option(
+            metavar="NAME", help="Metric for --tolerance: relmse, rmse or flip; for materials mean, largest or albedo."
+        ),
     ] = None
     encoding: Annotated[
-        str, Option(metavar="srgb|linear", help="Encoding of .png files; linear is for data, such as tables.")
+        str,
+        Option(
+            metavar="srgb|linear", help="Encoding of .png files; linear is for files that store data, such as tables."
+        ),
     ] = "srgb"
 
 
@@ -37,27 +45,28 @@ def compare(
         str,
         Argument(
             metavar="A",
-            help="The picture to compare: .exr, .hdr, .png, .npz; or a material.",
+            help="Picture (.exr, .hdr, .png or .npz) or material to compare.",
             autocompletion=completion.materials,
         ),
     ],
     reference: Annotated[
         str,
-        Argument(metavar="B", help="The reference: a picture or a material.", autocompletion=completion.materials),
+        Argument(metavar="B", help="Reference picture or material.", autocompletion=completion.materials),
     ],
     *,
     how: Judging,
-    output: Annotated[Path | None, output_option("FILE", "A map of the error: .png, .pdf, .svg.")] = None,
+    output: Annotated[Path | None, output_option("FILE", "File for a map of the error: .png, .pdf or .svg.")] = None,
     made: Material,
     as_json: Json = False,
 ) -> None:
-    """Measure the difference between picture A and picture B, or between material A and material B.
+    """Measure the difference between two pictures or two materials, A and B.
 
-    For pictures: RMSE, relMSE, ratio of the means, FLIP. A .png is decoded from sRGB; with --encoding linear it is read
-    as data. For .exr, .hdr and .npz, FLIP is HDR-FLIP: the maximum over the exposures at which B can be shown.
+    Pictures are compared by RMSE, relMSE, the ratio of their means, and FLIP. A .png is decoded from sRGB; with
+    --encoding linear, it is read as linear data. For .exr, .hdr and .npz, FLIP is HDR-FLIP, the maximum over the
+    exposures at which B can be displayed.
 
-    For materials: the largest and the mean difference of f, and the albedos. --param and --preset apply to each
-    material that has them.
+    Materials are compared by the mean and the largest difference of f, and by their albedos. --param and --preset apply
+    to each material that has them.
 
     \b
     Examples:

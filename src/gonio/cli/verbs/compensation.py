@@ -20,15 +20,17 @@ def compensation(
         list[str] | None,
         Argument(
             metavar="[MODEL]...",
-            help="More materials to compare: one with a base as a method, any other as a base.",
+            help="Additional materials to compare: as methods if they have a base, otherwise as bases.",
             autocompletion=completion.materials,
         ),
     ] = None,
-    output: Annotated[Path | None, output_option("DIR", "Write a picture and JSON there.")] = None,
-    samples: Annotated[int, samples_option("Random walks per point of the reference.")] = 200_000,
+    output: Annotated[Path | None, output_option("DIR", "Folder for a picture and a JSON file.")] = None,
+    samples: Annotated[int, samples_option("Number of random walks per reference value.")] = 200_000,
     as_json: Json = False,
 ) -> None:
-    """Compare methods that restore light lost by single scattering: furnace, error, reciprocity, cost.
+    """Compare methods that restore the light lost by single-scattering models.
+
+    The comparison covers the furnace test, the error, reciprocity and the cost.
 
     \b
     Examples:

@@ -15,18 +15,20 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=10)
 def compress(
-    files: Annotated[list[str], Argument(metavar="FILE...", help="Files of measured values; several share one file.")],
+    files: Annotated[
+        list[str], Argument(metavar="FILE...", help="Files of measured values; several are written to one file.")
+    ],
     *,
-    output: Annotated[Path, output_option("FILE", "The file to write: .gonio.")],
-    codec: Annotated[str, Option(metavar="NAME", help="log, lowrank, rgl or network.")] = "log",
-    bytes: Annotated[int, Option(metavar="N", help="Size per material, for log and lowrank.")] = 16384,
+    output: Annotated[Path, output_option("FILE", "File to write, with the suffix .gonio.")],
+    codec: Annotated[str, Option(metavar="NAME", help="Method of compression: log, lowrank, rgl or network.")] = "log",
+    bytes: Annotated[int, Option(metavar="N", help="Size per material in bytes, for log and lowrank.")] = 16384,
     as_json: Json = False,
 ) -> None:
-    """Write measured materials in fewer bytes, and report the error.
+    """Compress measured materials, and report the error.
 
-    log stores the logarithms as rounded cosine coefficients, lowrank stores low-rank factors that several materials
-    share, rgl stores an RGL table without its visible normals, network stores the 675 weights of a network trained
-    here. The result can be used wherever a measured file can.
+    The codec log stores the logarithms as rounded cosine coefficients; lowrank stores low-rank factors, which several
+    materials can share; rgl stores an RGL table without its density of visible normals; and network trains a neural
+    network and stores its 675 weights. The result can be used wherever a measured file can.
 
     \b
     Examples:

@@ -15,21 +15,21 @@ from .base import PICTURES, verb
 
 @verb(PICTURES, place=5)
 def convert(
-    source: Annotated[str, Argument(metavar="IN", help="A picture, measured values, or a material.")],
+    source: Annotated[str, Argument(metavar="IN", help="Picture, measured values, or material.")],
     *,
-    output: Annotated[Path, output_option("FILE", "The file; its suffix names the format.")],
+    output: Annotated[Path, output_option("FILE", "File to write; its suffix selects the format.")],
     exposure: Exposure = "0.0",
     phi: Annotated[
         int | None,
-        Option("--phi", metavar="DEG", help="Range of phi_d in a .binary: 180, or 360 for nonreciprocal values."),
+        Option("--phi", metavar="DEG", help="Range of phi_d in a .binary file: 180, or 360 for nonreciprocal values."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Write a picture, a measured material, or another program's material in another format.
 
     A picture is tone-mapped without rendering it again. Measured values are copied if both formats have the same kind
-    of table; otherwise they are resampled, and the measured error is reported. A material of a glTF or MaterialX file
-    becomes JSON for use in scenes, and an openpbr material becomes a MaterialX file.
+    of table; otherwise, they are resampled, and the resulting error is reported. A material from a glTF or MaterialX
+    file is converted to JSON for use in scenes, and an openpbr material is converted to a MaterialX file.
 
     \b
     Examples:

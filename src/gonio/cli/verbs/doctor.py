@@ -14,14 +14,16 @@ from .base import SUPPORT, verb
 
 @verb(SUPPORT, place=2)
 def doctor(
-    bench: Annotated[bool, Option("--bench", help="Measure the speed, compared with Mitsuba's own plugins.")] = False,
+    bench: Annotated[
+        bool, Option("--bench", help="Measure the speed, and compare it with that of Mitsuba's own plugins.")
+    ] = False,
     device: Device = "cpu",
     as_json: Json = False,
 ) -> None:
     """Report what this machine can render with, what is missing, and how to install it.
 
-    The exit code is 3 if it cannot render at all. With --bench, print a short table of speeds for bug reports: rays,
-    eval and sample of a material, direct light and paths, in millions per second.
+    The exit code is 3 if the machine cannot render at all. --bench prints a short table of speeds for bug reports:
+    rays, eval and sample of a material, direct lighting, and paths, in millions per second.
 
     \b
     Examples:

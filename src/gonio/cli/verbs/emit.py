@@ -23,34 +23,43 @@ SLASHES = tuple({"/", os.sep})  # at the end of a folder's name
 class Place(Options):
     """The place of a shader in a module with other code, and the files of its tables."""
 
-    prefix: Annotated[str, Option(metavar="TEXT", help="Begin all global names with this, such as g_.")] = ""
-    group: Annotated[int, Option(metavar="N", help="The group of the tables' bindings, not in GLSL ES.")] = 0
-    first_binding: Annotated[int, Option(metavar="N", help="Number of the first table's binding.")] = 0
+    prefix: Annotated[str, Option(metavar="TEXT", help="Prefix of all global names, such as g_.")] = ""
+    group: Annotated[int, Option(metavar="N", help="Binding group of the tables; GLSL ES has none.")] = 0
+    first_binding: Annotated[int, Option(metavar="N", help="Binding number of the first table.")] = 0
     tables: Annotated[
-        str, Option(metavar="raw|exr|ktx2", help="Format of the table files in a folder; by default raw float32.")
+        str, Option(metavar="raw|exr|ktx2", help="Format of the table files in a folder; raw float32 by default.")
     ] = ""
     half: Annotated[
-        bool, Option("--half", help="16-bit tables; the text states the error, also for parameters in 16 bits.")
+        bool, Option("--half", help="Write 16-bit tables, and state the errors of 16-bit tables and parameters.")
     ] = False
 
 
 class Content(Options):
     """The parts of the material to write, or the approximation that replaces its functions."""
 
-    functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample"
+    functions: Annotated[
+        str, Option(metavar="NAME,..", help="Functions to write: any of eval, pdf, sample and terms.")
+    ] = "eval,pdf,sample"
     lean: Annotated[
-        bool, Option("--lean", help="Omit layers that are off at these values, such as a coat of weight 0.")
+        bool, Option("--lean", help="Omit layers that the parameters switch off, such as a coat of weight 0.")
     ] = False
     constants: Annotated[
-        bool, Option("--constants", help="Also write the material's own values, as a constant of its struct.")
+        bool, Option("--constants", help="Also write the material's own values as a constant of the struct type.")
     ] = False
-    fold: Annotated[bool, Option("--fold", help="Put the material's own values into the code.")] = False
+    fold: Annotated[bool, Option("--fold", help="Insert the material's own values into the code as constants.")] = False
     fit: Annotated[
-        str, Option(metavar="N|N/M", help="Instead write albedos as rational fits of this order; N/0: polynomials.")
+        str,
+        Option(
+            metavar="N|N/M",
+            help="Order of rational fits to the albedos, written instead of the material; N/0: polynomials.",
+        ),
     ] = ""
-    ibl: Annotated[bool, Option("--ibl", help="Instead write the split sum of image-based lighting.")] = False
+    ibl: Annotated[
+        bool, Option("--ibl", help="Write the split sum for image-based lighting instead of the material.")
+    ] = False
     budget: Annotated[
-        int, Option(metavar="N", help="Choose the most accurate terms, table or fit within N operations.")
+        int,
+        Option(metavar="N", help="Largest number of operations; the most accurate terms, table or fit is selected."),
     ] = 0
 
 
@@ -58,7 +67,7 @@ Models = Annotated[
     list[str],
     Argument(
         metavar="MODEL",
-        help="A material; several share one module and the options.",
+        help="Material; several are written to one module and share the options.",
         autocompletion=completion.materials,
     ),
 ]
@@ -68,7 +77,7 @@ Language = Annotated[
         "--lang",
         "--language",
         metavar="NAME",
-        help="glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot, tsl, osl; numpy, torch, jax: a Python file.",
+        help="Language: glsl, glsl-vulkan, wgsl, hlsl, slang, msl, godot, tsl, osl; Python: numpy, torch, jax.",
         autocompletion=completion.languages,
     ),
 ]
@@ -83,17 +92,21 @@ def emit(
     made: Material,
     output: Annotated[
         list[str] | None,
-        output_option("FILE|DIR/", "The shader; or a folder for the shader, manifest.json and tables."),
+        output_option("FILE|DIR/", "File for the shader, or folder for the shader, manifest.json and tables."),
     ] = None,
     place: Place,
     check: Annotated[
-        int, Option(metavar="N", help="Instead of a shader, write N pairs of directions with 64-bit values as JSON.")
+        int,
+        Option(
+            metavar="N", help="Number of direction pairs to write as JSON, with 64-bit values, instead of a shader."
+        ),
     ] = 0,
     as_json: Json = False,
 ) -> None:
-    """Write a material, traced from its own source, as code in GLSL, WGSL, HLSL, Python or your own language.
+    """Translate a material from its source to GLSL, WGSL, HLSL, Python or a language of your own.
 
-    -o may be given twice. A name that ends in / is a folder; its tables are raw float32 unless --tables says otherwise.
+    -o may be given twice. A name that ends in / denotes a folder, whose tables are raw float32 unless --tables selects
+    another format.
 
     \b
     Examples:

@@ -19,7 +19,7 @@ def explain(
         str,
         Argument(
             metavar="[NAME]",
-            help="A material, any other member of a family (ggx, smith-correlated, path), or a family (fresnel).",
+            help="Material, other member of a family (ggx, smith-correlated, path), or family (fresnel).",
             autocompletion=completion.materials_and_distributions,
         ),
     ] = "",
@@ -29,8 +29,8 @@ def explain(
 ) -> None:
     """Print the manual page of a material, or of any member of a family: formula, parameters, limits, source.
 
-    The families are materials, distributions of normals, masking terms, Fresnel terms, integrators, laws and more. The
-    name of a family lists its members; without a name, the families are listed.
+    The families are materials, distributions of normals, masking terms, Fresnel terms, integrators, laws and more. For
+    the name of a family, the command lists its members; without a name, it lists the families.
 
     \b
     Examples:

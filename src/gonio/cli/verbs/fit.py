@@ -25,17 +25,24 @@ class Model(Options):
 
     model: Annotated[
         list[str] | None,
-        Option("--model", "-m", metavar="NAME", help='Model to fit, such as "lambert+ggx"; several are ranked.'),
+        Option(
+            "--model",
+            "-m",
+            metavar="NAME",
+            help='Model to fit, such as "lambert+ggx"; repeatable, to rank several models.',
+        ),
     ] = None
-    lobes: Annotated[int, Option(metavar="N", help="Copies of the last lobe in the model's sum.")] = 1
-    loss: Annotated[str, Option(metavar="NAME", help="relative, log, log1p, cuberoot or linear.")] = "relative"
+    lobes: Annotated[int, Option(metavar="N", help="Number of times that the model's last lobe is included.")] = 1
+    loss: Annotated[str, Option(metavar="NAME", help="Loss to minimize: relative, log, log1p, cuberoot or linear.")] = (
+        "relative"
+    )
 
 
 class Scene(Options):
     """The scene whose materials are fitted to a picture of it."""
 
     scene: Annotated[
-        Path | None, Option(metavar="FILE", help="The scene that DATA, a picture, shows; its materials are fitted.")
+        Path | None, Option(metavar="FILE", help="Scene whose materials are fitted to DATA, a picture of it.")
     ] = None
     spp: Spp = 64
 
@@ -44,24 +51,28 @@ class Scene(Options):
 def fit(
     data: Annotated[
         list[str] | None,
-        Argument(metavar="[DATA...]", help="Measurement files, or a folder of them; or a picture of --scene."),
+        Argument(
+            metavar="[DATA...]", help="Measurement files, a folder of them, or a picture of the scene given by --scene."
+        ),
     ] = None,
     *,
     what: Model,
     how: Fitting,
     of: Scene,
-    output: Annotated[Path | None, output_option("FILE", "The result: .json; a figure is written next to it.")] = None,
+    output: Annotated[
+        Path | None, output_option("FILE", "File for the result (.json); a figure is written next to it.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Fit materials to measured values: parameters with their 95 % intervals.
+    """Fit materials to measured values, and print the parameters with 95 % intervals.
 
-    -p NAME=VALUE fixes a parameter. Among several models, the one with the lowest criterion (BIC) is best: an extra
-    parameter must improve it. With several files, each result is stored at once: to continue after Ctrl-C, run the same
-    command again.
+    -p NAME=VALUE fixes a parameter. Several models are ranked by the Bayesian information criterion (BIC): the lowest
+    value is best, and an extra parameter must lower it. With several files, each result is stored as soon as it is
+    computed; to continue after Ctrl-C, run the same command again.
 
-    With --scene, parameters of the scene's materials are fitted to a picture of it: those that --free names, such as
-    shapes.0.material.alpha, or all of a material; shapes.0.material by default. --model replaces that material, and -p
-    sets values in the scene.
+    With --scene, materials of the scene are fitted to a picture of it. --free selects a parameter, such as
+    shapes.0.material.alpha, or all parameters of a material; the default is shapes.0.material. --model replaces that
+    material, and -p sets values in the scene.
 
     \b
     Examples:

@@ -15,12 +15,15 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=7)
 def info(
-    path: Annotated[str, Argument(metavar="FILE", help="Measured values, materials, or a baked folder.")],
+    path: Annotated[
+        str, Argument(metavar="FILE", help="File of measured values or materials, or folder of baked tables.")
+    ],
     as_json: Json = False,
 ) -> None:
-    """Describe a file: a measured material, materials in a .json of a fit, .gltf or .mtlx, or baked tables.
+    """Describe a file: a measured material, baked tables, or materials in a .gltf, a .mtlx or the .json of a fit.
 
-    For measurements: dimensions, ranges, invalid and negative values, albedo by angle, energy and reciprocity.
+    For a measured material, print its dimensions, ranges, invalid and negative values, albedo by angle, energy and
+    reciprocity.
 
     \b
     Examples:

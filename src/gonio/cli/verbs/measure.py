@@ -25,18 +25,35 @@ class Detector(Options):
     theta_i: Annotated[
         str | None,
         Option(
-            metavar="DEG", help="Angles of incidence, such as 0,30,60 or 0:85:5; for .gonio, .astm, .brdf and .csv."
+            metavar="DEG",
+            help="Angles of incidence in degrees, such as 0,30,60 or 0:85:5; for .gonio, .astm, .brdf, .csv.",
         ),
     ] = None
-    theta_r: Annotated[str | None, Option(metavar="DEG", help="Viewing angles.")] = None
-    phi: Annotated[str | None, Option(metavar="DEG", help="Azimuths between light and view, 0 to 180.")] = None
-    solid_angle: Annotated[
-        float | None, Option(metavar="SR", help="Its aperture; by default 0.006 for surfaces, a point for materials.")
+    theta_r: Annotated[
+        str | None, Option(metavar="DEG", help="Viewing angles in degrees, in the same form as --theta-i.")
     ] = None
-    noise: Annotated[float, Option(metavar="FRACTION", help="Relative standard deviation of a reading.")] = 0.0
-    blocked: Annotated[float, Option(metavar="DEG", help="Angle around the lamp that it cannot reach.")] = 0.0
+    phi: Annotated[
+        str | None, Option(metavar="DEG", help="Azimuths between light and view, from 0 to 180 degrees.")
+    ] = None
+    solid_angle: Annotated[
+        float | None,
+        Option(
+            metavar="SR", help="Solid angle of the detector; by default 0.006 sr for surfaces, a point for materials."
+        ),
+    ] = None
+    noise: Annotated[
+        float, Option(metavar="FRACTION", help="Relative standard deviation of the noise in each reading.")
+    ] = 0.0
+    blocked: Annotated[
+        float,
+        Option(metavar="DEG", help="Angle around the lamp within which the detector blocks the light, in degrees."),
+    ] = 0.0
     table: Annotated[
-        str, Option(metavar="NAME", help="Table in .gonio: angles, half-difference, adaptive, specular, samples.")
+        str,
+        Option(
+            metavar="NAME",
+            help="Kind of table in a .gonio file: angles, half-difference, adaptive, specular or samples.",
+        ),
     ] = ""
 
 
@@ -47,14 +64,16 @@ class Specimen(Options):
         str | None,
         Option(
             metavar="NAME",
-            help="gaussian, vgroove, spheres or a height map (.exr); --param sets its parameters.",
+            help="Surface: gaussian, vgroove, spheres or a height map (.exr); --param sets its parameters.",
             autocompletion=completion.surfaces,
         ),
     ] = None
-    facet: Annotated[str, Option(metavar="MODEL", help="mirror, lambert:albedo=0.8, conductor:Au, ...")] = "mirror"
+    facet: Annotated[
+        str, Option(metavar="MODEL", help="Material of the facets: mirror, lambert:albedo=0.8, conductor:Au, ...")
+    ] = "mirror"
     bounces: Annotated[str, Option(metavar="NAME", help="Bounces to count: all, first or later.")] = "all"
-    samples: Annotated[int, samples_option("Rays per angle of incidence.")] = 1_000_000
-    patches: Annotated[int, Option(metavar="N", help="Patches of a random surface.")] = 16
+    samples: Annotated[int, samples_option("Number of rays per angle of incidence.")] = 1_000_000
+    patches: Annotated[int, Option(metavar="N", help="Number of patches of a random surface to measure.")] = 16
     seed: Seed = None
     device: Device = "cpu"
 
@@ -63,10 +82,14 @@ class Specimen(Options):
 def measure(
     material: Annotated[
         str | None,
-        Argument(metavar="MODEL", help="A material; none with --surface.", autocompletion=completion.materials),
+        Argument(
+            metavar="MODEL",
+            help="Material to measure; omit it if --surface is given.",
+            autocompletion=completion.materials,
+        ),
     ] = None,
     *,
-    output: Annotated[Path, output_option("FILE", "The table; the suffix names its format.")],
+    output: Annotated[Path, output_option("FILE", "File for the table; its suffix selects the format.")],
     made: Material,
     detector: Detector,
     specimen: Specimen,
@@ -74,8 +97,9 @@ def measure(
 ) -> None:
     """Measure a material, or a surface of facets, with a virtual gonioreflectometer.
 
-    Rays are sent to the surface and bounce until they leave; the detector counts them. Any material can be measured
-    too, into any format that Gonio writes. Each value has its standard error, which .gonio files store.
+    Rays are traced to the surface and bounce until they leave it; the detector counts them. Any material can be
+    measured too, and the output can have any format that Gonio writes. Each value has a standard error, which .gonio
+    files store.
 
     \b
     Examples:

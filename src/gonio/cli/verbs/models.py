@@ -14,8 +14,12 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=4)
 def models(
-    quality: Annotated[bool, Option("--quality", help="Sampling quality of each material, at its defaults.")] = False,
-    library: Annotated[bool, Option("--library", help="The named materials, with the published fits of each.")] = False,
+    quality: Annotated[
+        bool, Option("--quality", help="Print the sampling quality of each material with default parameters.")
+    ] = False,
+    library: Annotated[
+        bool, Option("--library", help="List the named materials, with the published fits of each.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """List the materials.

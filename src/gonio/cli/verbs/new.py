@@ -24,12 +24,12 @@ def _kinds() -> list[str]:
 
 @verb(MATERIALS, place=9)
 def new(
-    kind: Annotated[str, Argument(metavar="material", help="What to create.", autocompletion=_kinds)],
-    name: Annotated[str, Argument(metavar="NAME", help="Its name, such as velvet or crushed-velvet.")],
-    output: Annotated[Path, output_option("DIR", "Folder of the two files.")] = Path(),
+    kind: Annotated[str, Argument(metavar="material", help="Kind of file to create.", autocompletion=_kinds)],
+    name: Annotated[str, Argument(metavar="NAME", help="Name of the material, such as velvet or crushed-velvet.")],
+    output: Annotated[Path, output_option("DIR", "Folder for the two files.")] = Path(),
     as_json: Json = False,
 ) -> None:
-    """Create a material of your own: NAME.py, which works, and test_NAME.py, which passes.
+    """Create a material of your own: a working example, NAME.py, and a passing test, test_NAME.py.
 
     \b
     Examples:

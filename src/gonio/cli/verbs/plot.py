@@ -16,9 +16,13 @@ from .base import MATERIALS, verb
 class Interface(Options):
     """The interface of `gonio plot fresnel`."""
 
-    eta: Annotated[float | None, Option(metavar="ETA", help="For fresnel: relative index, inside / outside.")] = None
-    k: Annotated[float, Option("--k", metavar="K", help="For fresnel: imaginary part of the index.")] = 0.0
-    metal: Annotated[str | None, Option(metavar="NAME", help="For fresnel: a metal, such as Au.")] = None
+    eta: Annotated[
+        float | None, Option(metavar="ETA", help="Relative index of refraction, inside / outside, for fresnel.")
+    ] = None
+    k: Annotated[
+        float, Option("--k", metavar="K", help="Imaginary part of the relative index of refraction, for fresnel.")
+    ] = 0.0
+    metal: Annotated[str | None, Option(metavar="NAME", help="Metal, such as Au, for fresnel.")] = None
 
 
 @verb(MATERIALS, place=1)
@@ -27,22 +31,24 @@ def plot(
         list[str],
         Argument(
             metavar="MODEL...",
-            help="Materials, as `gonio models` lists them; or a baked folder, or fresnel.",
+            help="Materials, as listed by `gonio models`; or a folder of baked tables, or fresnel.",
             autocompletion=completion.materials,
         ),
     ],
     *,
     made: Material,
-    kind: Annotated[str, Option(metavar="lobe|slice|albedo|image", help="What to draw.")] = "lobe",
-    angles: Annotated[str | None, Option(metavar="A,B,..", help="Viewing angles, degrees from the normal.")] = None,
+    kind: Annotated[str, Option(metavar="lobe|slice|albedo|image", help="Kind of plot.")] = "lobe",
+    angles: Annotated[
+        str | None, Option(metavar="A,B,..", help="Viewing angles in degrees from the normal, such as 0,45.")
+    ] = None,
     interface: Interface,
-    output: Annotated[Path | None, output_option("FILE", "The figure: .png, .pdf, .svg.")] = None,
+    output: Annotated[Path | None, output_option("FILE", "File for the figure: .png, .pdf or .svg.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Draw materials (lobes, slices, albedo or image slices), a folder of baked tables, or a Fresnel reflectance.
+    """Plot materials (as lobes, slices, albedo or image slices), a folder of baked tables, or a Fresnel reflectance.
 
-    Lobes are polar plots; slices show f as a function of angle. The sampling density of a material is drawn dashed over
-    its values. Several materials share their axes. `fresnel` stands for the reflectance of an interface.
+    Lobes are polar plots; slices show f as a function of angle. A dashed line shows the sampling density of a material.
+    Several materials are plotted on the same axes. The name fresnel plots the reflectance of an interface.
 
     \b
     Examples:

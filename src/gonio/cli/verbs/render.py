@@ -29,7 +29,7 @@ class Until(Options):
     timeout: Timeout = None
     until_error: Annotated[
         float | None,
-        Option(metavar="E", help="Stop when the estimated relMSE is below E, or after --spp; 65536 by default."),
+        Option(metavar="E", help="Estimated relMSE at which to stop; --spp is then the maximum, 65536 by default."),
     ] = None
     checkpoint: Checkpoint = None
 
@@ -38,7 +38,7 @@ class Until(Options):
 def render(
     scene: SceneFile,
     *,
-    output: Annotated[Path | None, output_option("FILE", "The picture: .exr, .hdr, .png or .npz.")] = None,
+    output: Annotated[Path | None, output_option("FILE", "File for the picture: .exr, .hdr, .png or .npz.")] = None,
     made: Material,
     how: Rendering,
     until: Until,
@@ -49,8 +49,8 @@ def render(
 
     Without -o, the picture is written to the current folder under the name that the scene gives it.
     Ctrl-C ends the render after the current pass (about half a second) and writes the picture so far; a second Ctrl-C
-    ends it at once. SIGTERM and SIGHUP do the same. A render of over a minute stores a checkpoint next to the picture,
-    from which `gonio resume`, or the same command again, continues.
+    ends it at once. SIGTERM and SIGHUP do the same. A render that takes over a minute stores a checkpoint next to the
+    picture. To continue from it, use `gonio resume` or run the same command again.
 
     \b
     Examples:

@@ -19,40 +19,45 @@ class Figures(Options):
 
     study: Annotated[
         list[str] | None,
-        Option("--study", metavar="NAME=V1,V2", help="A sheet of the scene; ';' separates a second NAME; repeatable."),
+        Option(
+            "--study",
+            metavar="NAME=V1,V2",
+            help="Values for a sheet of the scene; ';' separates a second NAME; repeatable.",
+        ),
     ] = None
     plot: Annotated[
         list[str] | None,
-        Option("--plot", metavar="[KIND=]MODEL", help="A plot of materials, separated by ';'; repeatable."),
+        Option("--plot", metavar="[KIND=]MODEL", help="Materials for a plot, separated by ';'; repeatable."),
     ] = None
     bake: Annotated[
-        list[str] | None, Option("--bake", metavar="TARGET", help="Albedo tables of a distribution; repeatable.")
+        list[str] | None,
+        Option("--bake", metavar="TARGET", help="Distribution whose albedo tables are added, such as ggx; repeatable."),
     ] = None
     work: Annotated[
         list[str] | None,
-        Option("--work", metavar="WORK[;MODEL]", help="Your own work to judge, such as f.csv; repeatable."),
+        Option("--work", metavar="WORK[;MODEL]", help="Your own work to check, such as f.csv; repeatable."),
     ] = None
 
 
 @verb(PICTURES, place=3)
 def report(
-    target: Annotated[
-        str, Argument(metavar="LIST|SCENE", help="A list of figures (.toml), a scene's folder, or a material.")
-    ],
+    target: Annotated[str, Argument(metavar="LIST|SCENE", help="List of figures (.toml), scene folder, or material.")],
     *,
-    output: Annotated[Path | None, output_option("DIR", "Folder of the report; NAME-report by default.")] = None,
+    output: Annotated[Path | None, output_option("DIR", "Folder for the report; NAME-report by default.")] = None,
     figures: Figures,
     how: Rendering,
     executor: Executor,
     title: Annotated[str, Option(metavar="TEXT", help="Heading of a new report.md.")] = "",
-    pdf: Annotated[bool, Option("--pdf", help="Also print the page to report.pdf, by Chromium or Chrome.")] = False,
+    pdf: Annotated[
+        bool, Option("--pdf", help="Also print the page to report.pdf, with an installed Chromium, Chrome or Edge.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
-    """Write a lab report: pictures, sheets, plots, tables and verdicts as one document, with text that you edit.
+    """Write a lab report: pictures, sheets, plots, tables and verdicts in one document, with text that you edit.
 
     The folder contains report.md with the text, report.html (a single file that needs no network), and the figures.
-    report.md is written only if it is missing: edit its text and run the same command again. Unchanged figures are not
-    made again.
+    report.md is written only if it is missing: edit its text and run the same command again. Figures that have not
+    changed are not created again.
 
     \b
     Examples:

@@ -15,9 +15,11 @@ from .render import carry_out
 
 @verb(PICTURES, place=1)
 def resume(
-    checkpoint: Annotated[Path, Argument(metavar="FILE", help="A checkpoint of `gonio render`.")],
+    checkpoint: Annotated[Path, Argument(metavar="FILE", help="Checkpoint written by `gonio render`.")],
     *,
-    output: Annotated[Path | None, output_option("FILE", "The picture; by default that of the render.")] = None,
+    output: Annotated[
+        Path | None, output_option("FILE", "File for the picture; by default that of the render.")
+    ] = None,
     spp: Spp = None,
     timeout: Timeout = None,
     threads: Threads = None,
@@ -25,11 +27,12 @@ def resume(
     executor: Executor,
     as_json: Json = False,
 ) -> None:
-    """Continue a render from its checkpoint, after it was stopped or to add samples.
+    """Continue a render from its checkpoint, after an interruption or to add samples.
 
     The picture is bit-identical to that of an uninterrupted render. --spp gives the total number of samples. A
     checkpoint is rejected if its scene, files, settings, device or version have changed. Without -o, the picture is
-    written where the checkpoint says if that is in the checkpoint's folder, else next to the checkpoint.
+    written to the path that the checkpoint states if this path is in the checkpoint's folder, and next to the
+    checkpoint otherwise.
 
     \b
     Examples:

@@ -20,11 +20,15 @@ KINDS = ("scene", "report", "manifest")
 def schema(
     kind: Annotated[
         str,
-        Argument(metavar="scene|report|manifest", help="For scene files, reports, or the manifests of shaders."),
+        Argument(
+            metavar="scene|report|manifest", help="Schema to print: of scene files, reports, or manifests of shaders."
+        ),
     ] = "scene",
-    output: Annotated[Path | None, output_option("FILE", "File to write; printed by default.")] = None,
+    output: Annotated[
+        Path | None, output_option("FILE", "File for the schema; by default, the schema is printed.")
+    ] = None,
 ) -> None:
-    """Print the JSON Schema of scene files, reports or manifests, for completion in editors and validation by programs.
+    """Print the JSON Schema of scene files, reports or manifests, for completion in editors and for validation.
 
     \b
     Examples:

@@ -20,20 +20,20 @@ def study(
     *,
     vary: Annotated[
         list[str],
-        Option(metavar="NAME=V1,V2|A..B", help="A parameter or path and its values; repeatable."),
+        Option(metavar="NAME=V1,V2|A..B", help="Parameter or path, and its values; repeatable."),
     ],
-    output: Annotated[Path, output_option("FILE", "The sheet: .png, .pdf or .svg.")] = Path("study.png"),
+    output: Annotated[Path, output_option("FILE", "File for the sheet: .png, .pdf or .svg.")] = Path("study.png"),
     made: Material,
     how: Rendering,
     executor: Executor,
     title: Annotated[str, Option(metavar="TEXT", help="Heading of the sheet.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Compare parameters: render a scene with each value and arrange the pictures on one labeled sheet.
+    """Compare parameter values: render a scene with each value, and arrange the pictures on one labeled sheet.
 
-    One --vary gives a row, two give a grid (the first down, the second across), more give several grids. A path names a
-    value in the scene, or a parameter of a material, such as p or base.alpha. Several paths in one --vary change
-    together, for instance with a constant sum: kd,ks=(0.05,0.25),(0.15,0.15).
+    One --vary gives a row, two give a grid (the first varies down, the second across), and more give several grids. A
+    path denotes a value in the scene, or a parameter of a material, such as p or base.alpha. Several paths in one
+    --vary change together, for example with a constant sum: kd,ks=(0.05,0.25),(0.15,0.15).
 
     \b
     Examples:

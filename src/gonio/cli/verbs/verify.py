@@ -24,37 +24,53 @@ if TYPE_CHECKING:
 class Files(Options):
     """Reports for people and for continuous integration."""
 
-    output: Annotated[Path | None, output_option("DIR", "Write report.html and report.json there.")] = None
-    junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML.")] = None
-    sarif: Annotated[Path | None, Option("--sarif", metavar="FILE", help="Write the failures as SARIF 2.1.0.")] = None
+    output: Annotated[Path | None, output_option("DIR", "Folder for report.html and report.json.")] = None
+    junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="JUnit XML file for the verdicts.")] = None
+    sarif: Annotated[Path | None, Option("--sarif", metavar="FILE", help="SARIF 2.1.0 file for the failures.")] = None
     github: Annotated[
-        bool, Option("--github", help="Print annotations for GitHub Actions; the default on its runners.")
+        bool, Option("--github", help="Print annotations for GitHub Actions; on by default on its runners.")
     ] = False
     baseline: Annotated[
-        Path | None, Option("--baseline", metavar="FILE", help="Fail only on failures not listed there.")
+        Path | None,
+        Option(
+            "--baseline",
+            metavar="FILE",
+            help="File of known failures, as written by --write-baseline; only new failures count.",
+        ),
     ] = None
     write_baseline: Annotated[
-        Path | None, Option("--write-baseline", metavar="FILE", help="List the failures there, for later runs.")
+        Path | None,
+        Option("--write-baseline", metavar="FILE", help="File to write the failures to, as a baseline for later runs."),
     ] = None
     tolerate: Annotated[
-        str, Option(metavar="GRADE", help="Pass failures up to a grade: invisible, small or visible.")
+        str, Option(metavar="GRADE", help="Severest grade of failures that pass: invisible, small or visible.")
     ] = ""
 
 
 class Effort(Options):
     """Options that select the laws to test, and the effort."""
 
-    vary: Annotated[str, Option(metavar="NAME=V1,V2|A..B", help="A report card per value; a range gives five.")] = ""
-    quick: Annotated[bool, Option("--quick", help="A first look, in seconds.")] = False
-    deep: Annotated[bool, Option("--deep", help="More samples, directions and roughnesses.")] = False
+    vary: Annotated[
+        str,
+        Option(
+            metavar="NAME=V1,V2|A..B", help="Parameter and its values, one report card per value; a range gives five."
+        ),
+    ] = ""
+    quick: Annotated[bool, Option("--quick", help="Run a quick test, in seconds.")] = False
+    deep: Annotated[bool, Option("--deep", help="Test with more samples, directions and roughnesses.")] = False
     seed: Seed = None
     law: Annotated[
         list[str] | None,
-        Option("--law", metavar="NAME", help="Only this law; repeatable.", autocompletion=completion.laws),
+        Option(
+            "--law",
+            metavar="NAME",
+            help="Law to test, instead of all laws; repeatable.",
+            autocompletion=completion.laws,
+        ),
     ] = None
-    timeout: Annotated[float | None, Option(metavar="S", help="Stop a law after S seconds; 300 by default.")] = None
+    timeout: Annotated[float | None, Option(metavar="S", help="Time limit per law in seconds; 300 by default.")] = None
     memory: Annotated[
-        float | None, Option(metavar="GB", help="Memory limit per BSDF; half of the machine's by default.")
+        float | None, Option(metavar="GB", help="Memory limit per BSDF; half of the machine's memory by default.")
     ] = None
 
     def name(self) -> str:
@@ -72,7 +88,7 @@ def verify(
         Argument(
             metavar="TARGET",
             help="MODEL, FILE.py:CLASS, a shader such as FILE.glsl, mitsuba:PLUGIN, or a Mitsuba .xml or .json; "
-            "several share the options.",
+            "several are verified with the same options.",
             autocompletion=completion.materials,
         ),
     ],
@@ -81,15 +97,17 @@ def verify(
     made: Material,
     how: Effort,
     at: Annotated[
-        str, Option(metavar="O/I", help="Only print one pair in both orders, theta,phi/theta,phi in degrees.")
+        str,
+        Option(metavar="O/I", help="Pair of directions to evaluate in both orders, theta,phi/theta,phi in degrees."),
     ] = "",
     executor: Executor,
     as_json: Json = False,
 ) -> None:
-    """Verify BSDFs: energy, reciprocity, sampling, gradients, precision.
+    """Verify BSDFs: energy conservation, reciprocity, sampling, gradients and precision.
 
-    Each target is judged in its own process, which it may crash or block. The exit code is 1 if a target violates a law
-    without declaring it, or 4 if no picture shows any of these violations.
+    Each target is tested in a separate process, so a BSDF that crashes or does not return does not stop the test. The
+    exit code is 1 if a target violates a law without declaring the violation, or 4 if all such violations are too small
+    to be visible in a picture.
 
     \b
     Examples:

@@ -23,7 +23,7 @@ class Address(Options):
     """The address of the page's server."""
 
     host: Annotated[str, Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1"
-    port: Annotated[int, Option(metavar="N", help="Port to listen on; 0 takes any free one.")] = 0
+    port: Annotated[int, Option(metavar="N", help="Port to listen on; 0 selects any free port.")] = 0
     browser: Annotated[bool, Option("--open/--no-open", help="Open the page in a browser.")] = True
 
 
@@ -33,7 +33,7 @@ def view(
         list[str] | None,
         Argument(
             metavar="SCENE|MODEL",
-            help="A lab scene, or materials; by default gold with and without Kulla-Conty.",
+            help="Lab scene, or materials; by default gold with and without Kulla-Conty.",
             autocompletion=completion.materials,
         ),
     ] = None,
@@ -41,20 +41,26 @@ def view(
     made: Material,
     output: Annotated[
         Path | None,
-        Option("-o", "--output", "--export", metavar="FILE", help="Write the page as one .html and exit."),
+        Option(
+            "-o",
+            "--output",
+            "--export",
+            metavar="FILE",
+            help="HTML file for the page; no server is started.",
+        ),
     ] = None,
     address: Address,
     homework: Annotated[
-        bool, Option("--homework", help="The two rows of homework 4 with the terms of its text, under one light.")
+        bool, Option("--homework", help="Show the two rows of homework 4, with the terms of its text and one light.")
     ] = False,
     device: Device = "cpu",
     trust: Trust,
     as_json: Json = False,
 ) -> None:
-    """Show materials live on shading balls, in a browser, next to a path-traced reference.
+    """Show materials on shading balls in a browser, interactively, next to a path-traced reference.
 
-    FILE.py:CLASS and shaders (FILE.glsl) are watched: when a file is saved, the page shows the new picture, or the
-    error in it. With -o the page is one file that needs no server and no network.
+    The files of FILE.py:CLASS and of shaders (FILE.glsl) are watched: when a file is saved, the page shows the new
+    picture, or the error in the file. With -o, the page is a single file that needs no server and no network.
 
     \b
     Examples:
