@@ -141,9 +141,9 @@ def run_programs(packages: list[shaders.Package]) -> None:
 
 
 def cause(engine: Engine, name: str, law: str, version: str, figures: dict[str, float]) -> str:
-    """The cause of a failure, with measured values of the trials, or "unexplained"."""
+    """The cause of a failure, with measured values of the trials, or "unknown"."""
     text = engine.causes.get((name, law, version)) or engine.causes.get((name, law))
-    return text.format_map(figures) if text else "unexplained."
+    return text.format_map(figures) if text else "unknown."
 
 
 def page(engine: Engine, results: dict[str, Any]) -> str:

@@ -130,9 +130,7 @@ def page(stored: dict[str, Any]) -> str:
     for name, laws in models.items():
         for law, one in laws.items():
             if one["status"] == "fail":
-                cause = (
-                    CAUSES.get((name, law)) or _follows(one) or CAUSES.get((name, "")) or one["cause"] or "unexplained"
-                )
+                cause = CAUSES.get((name, law)) or _follows(one) or CAUSES.get((name, "")) or one["cause"] or "unknown"
                 text = f"- **{name}**, {law}: {one['why']}; {one['size']}. Cause: {cause}"
                 lines.append(textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False))
     lines += ["", "## Factors and views", "", FACTORS, "", *_table(factors), "", AGAIN]

@@ -94,7 +94,7 @@ def trials(target: str) -> list[Any]:
 
 def losses(report: Report) -> dict[str, str]:
     """The loss of the white furnace, per setting."""
-    words = "white furnace loses "
+    words = "loss in a white furnace: "
     notes_of = {card.title: [n for n in card["energy"].notes if n.startswith(words)] for card in report.cards}
     return {title: notes[0].removeprefix(words) for title, notes in notes_of.items() if notes}
 
@@ -134,7 +134,7 @@ def findings(target: str, report: Report) -> list[dict[str, Any]]:
                     "target": target,
                     "law": v.law,
                     "size": _size(v),
-                    "cause": v.cause or "unexplained",
+                    "cause": v.cause or "unknown",
                     "upstream": UPSTREAM.get((target.removeprefix("mitsuba:"), v.law), ""),
                     "program": f"programs/{name}.py" if v.reproduction else "",
                 }
@@ -149,7 +149,7 @@ def _size(v: Verdict) -> str:
         verb = {"bias": "wrong by", "lost": "loses", "gained": "gains"}[v.bias.kind]
         return f"{verb} {percent(v.bias.average)} on average, {percent(v.bias.worst)} at worst"
     if v.bias.kind == "interface":
-        return _clean("; ".join(why for why in v.why if "at most" not in why))
+        return _clean("; ".join(why for why in v.why if "is allowed" not in why))
     return _clean(v.bias.where)
 
 
@@ -176,8 +176,8 @@ def page(target: str, report: Report) -> str:
         for v in sorted((v for v in card.verdicts if v.failed), key=_rank):
             lines += ["", f"**{v.law}**: {'; '.join(_clean(w) for w in v.why)}."]
             if v.bias is not None:
-                lines += [f"In a picture: {_clean(v.bias.words)}."]
-            lines += [f"Cause: {_clean(v.cause) or 'unexplained'}.", "", f"    {v.command}"]
+                lines += [f"Effect on a picture: {_clean(v.bias.words)}."]
+            lines += [f"Cause: {_clean(v.cause) or 'unknown'}.", "", f"    {v.command}"]
             if v.reproduction:
                 lines += ["", "```python", v.reproduction.rstrip(), "```"]
     return "\n".join(lines) + "\n" + BLIND
@@ -186,7 +186,7 @@ def page(target: str, report: Report) -> str:
 def _remark(v: Verdict) -> str:
     if v.status == NOT_APPLICABLE:
         return _clean("; ".join(v.why))
-    return _clean("; ".join(filter(None, [*v.notes, v.worst])))
+    return _clean("; ".join([*v.notes, *([f"worst case ({v.worst})"] if v.worst else [])]))
 
 
 def _number(text: str) -> str:

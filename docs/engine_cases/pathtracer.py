@@ -43,7 +43,7 @@ CAUSES = {
     (
         "pathtracer",
         "weight",
-    ): "unexplained; the size is that of 64-bit rounding errors, and only roughness 0 is affected.",
+    ): "unknown; the size is that of 64-bit rounding errors, and only roughness 0 is affected.",
     ("pathtracer", "pdf"): "`ggxDistribution` uses an alpha^2 of at least 1e-6, whereas `ggxDirection` samples normals "
     "with the given alpha: below roughness 0.03, the density is wider than the distribution of the samples.",
     ("pathtracer", "reciprocity"): "Two terms are responsible. `sheenColor` lacks the cosine of the light, which "

@@ -294,7 +294,9 @@ def test_loss_is_judged_where_the_adapter_means_none(tmp_path: Path) -> None:
         file = written(tmp_path, f"{name}.glsl", LOSSY)
         written(tmp_path, f"{name}.glsl.toml", claim + range_)
         assert energy_of(file).status == status
-    assert any("loses 0.5000 at 0 degrees, more than the claimed 0.1" in one for one in energy_of(file).why)
+    assert any(
+        "loss in a white furnace: 0.5000 at 0 degrees, more than the declared 0.1" in one for one in energy_of(file).why
+    )
 
 
 @pytest.mark.slow
@@ -304,7 +306,7 @@ def test_claim_of_a_shader_that_is_black_at_its_given_values_fails(tmp_path: Pat
     written(tmp_path, "black.glsl.toml", adapter)
     verdict = energy_of(file)
     assert verdict.status == "fail" and verdict.grade is Grade.BROKEN
-    assert any("white furnace loses 1.0000" in one for one in verdict.why)
+    assert any("loss in a white furnace: 1.0000" in one for one in verdict.why)
 
 
 @pytest.mark.sample(1)
@@ -316,7 +318,7 @@ def test_albedo_that_a_shader_states_is_judged(tmp_path: Path, name: str, status
     verdict = energy_of(file)
     assert verdict.status == status
     if status == "fail":
-        assert "the albedo that is stated, squared, is " in verdict.cause
+        assert "the stated albedo, squared, is " in verdict.cause
         assert verdict.grade is Grade.BROKEN
 
 
@@ -345,7 +347,7 @@ def test_loss_of_mixed_parameters_is_explained(tmp_path: Path) -> None:
     file = written(tmp_path, "mixed.glsl", MIXED)
     adapter = "function = 'brdf'\nlossless_tolerance = 0.02\n[parameters.metal]\ndefault = 0.5\nlow = 0.0\nhigh = 1.0\n"
     written(tmp_path, "mixed.glsl.toml", adapter)
-    assert "0.0000 at metal = 1: parameters mixed in place of two lobes?" in energy_of(file).cause
+    assert "0.0000 at metal = 1: are parameters mixed instead of two lobes?" in energy_of(file).cause
     written(tmp_path, "mixed.glsl.toml", adapter.replace("high = 1.0", "high = 0.5"))
     shaders.files.forget()
     assert "the loss depends on metal: 0.0000 at metal = 0 and 0.2500 at metal = 0.5" in energy_of(file).cause

@@ -67,12 +67,12 @@ class SaysOpaque(go.Dielectric):
 
 def test_an_answer_that_depends_on_the_batch_is_caught() -> None:
     verdict = verify(OfTheBatch(), quick=True, law="calls")["calls"]
-    assert verdict.failed and any(line.startswith("one row at a time") for line in verdict.why)
+    assert verdict.failed and any(line.startswith("one ray per call") for line in verdict.why)
 
 
 def test_a_declared_fact_is_held_to() -> None:
     why = verify(SaysOpaque(alpha=0.3), quick=True, law="calls")["calls"].why
-    assert any("`transmits` says that none is" in line for line in why), why
+    assert any("`transmits` is False" in line for line in why), why
 
 
 @pytest.mark.sample(1)
@@ -142,4 +142,4 @@ def test_a_denormal_number_that_is_0_in_another_kernel_is_no_difference() -> Non
     wo = wi = np.array([[0.0, 0.0, 1.0]])
     for value, differs in ((1e-38, False), (1e-20, True)):
         first, second = {"eval": np.array([[0.0, 0.0, value]])}, {"eval": np.zeros((1, 3))}
-        assert bool(calls._unlike("one row at a time", first, second, wo, wi, 1e-4).wrong) == differs
+        assert bool(calls._unlike("one ray per call", first, second, wo, wi, 1e-4).wrong) == differs

@@ -179,8 +179,8 @@ class EncodedUnderVarnish(RightDiffuse):
         (FresnelAtTheNormal, "reciprocity", "F(n.o) / F(n.i)"),
         (OneSidedCoupling, "reciprocity", "g(wo) / g(wi)"),
         (WrongScaling, "reciprocity", "eta^4 in transmission"),
-        (OnePercentMore, "energy", "1.01 times the incident light"),
-        (MoreAtGrazing, "energy", "1.02 times as much where wo's angle to the normal is beyond"),
+        (OnePercentMore, "energy", "the albedo is 1.01 for every wo"),
+        (MoreAtGrazing, "energy", "1.02 where wo's angle to the normal is beyond"),
         (BlueGains, "energy", "blue is 1.2 times the other channels"),
         (AlbedoSquared, "linearity", "albedo^2"),
         (EncodedUnderVarnish, "linearity", "albedo^2.2, within"),
@@ -218,7 +218,7 @@ class NarrowPdf(RightFacets):
     ("mistake", "words"),
     [
         (HalfVectorPdf, "1 / (4 (o.m))"),
-        (PdfOfTheSphere, "samples over pdf are 2,"),
+        (PdfOfTheSphere, "the ratio of samples to pdf is 2,"),
         (NarrowPdf, "sqrt(alpha)"),
         (OtherLobeWeights, ""),
         (RightLobes, ""),
@@ -238,7 +238,7 @@ def test_samples_name_the_factor_of_the_pdf(mistake: type, words: str) -> None:
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
-        (OtherLobeWeights, "the probability of the choice is another one in the pdf"),
+        (OtherLobeWeights, "different probabilities in pdf and sample"),
         (RightLobes, ""),
         (HalfVectorPdf, ""),
     ],
@@ -287,9 +287,9 @@ def test_what_the_examiners_named_is_named() -> None:
     from mutants.third.smooth import ChoiceNumberAgain, GreyWeight, OneLobeDensity
 
     for cls, law, words in (
-        (ChoiceNumberAgain, "pdf", "u.x chooses a lobe"),
+        (ChoiceNumberAgain, "pdf", "does u.x select both the lobe and its direction"),
         (GreyWeight, "weight", "the weight is gray"),
-        (OneLobeDensity, "weight", "a missing lobe of a mixture"),
+        (OneLobeDensity, "weight", "is a lobe of a mixture missing"),
         (CertainOfItself, "delta", "the pdf of delta samples is 1"),
     ):
         assert words in verify(cls(), quick=True, law=law)[law].cause, cls
@@ -374,14 +374,19 @@ class DeclaredAnisotropic(RightDiffuse):
 
 def test_anisotropy_that_neither_values_nor_samples_have_is_no_fact() -> None:
     verdict = verify(DeclaredAnisotropic(), quick=True, law="isotropy")["isotropy"]
-    assert verdict.failed and "declared anisotropic, but a rotation changes it by" in " ".join(verdict.why), verdict.why
+    assert verdict.failed and "declared anisotropic, but rotation changes the values by" in " ".join(verdict.why), (
+        verdict.why
+    )
 
 
 def test_a_color_whose_channels_mix_is_named() -> None:
     rng = np.random.default_rng(4)
     wo, wi = (np.abs(w) / np.linalg.norm(w, axis=1, keepdims=True) for w in rng.normal(size=(2, 64, 3)))
     found = channels.mixed(of(MeanOfChannels()), wo, wi)
-    assert found is not None and "red values change with the green and blue of albedo" in found.words
+    assert (
+        found is not None
+        and "the red channel of the result depends on the green and blue channels of albedo" in found.words
+    )
     assert channels.mixed(of(RightDiffuse()), wo, wi) is None
 
 
@@ -404,31 +409,31 @@ class FresnelOneWay(Weighed):
 LAST: list[tuple[str, str, str]] = [
     ("w1_corners.W1RotatedSample", "pdf", "the pdf of wi rotated by 2 rotation"),
     ("w1_corners.W1ClampedNumbers", "pdf", "while the second random number is below"),
-    ("w1_corners.W1ForgottenHaze", "pdf", "a lobe that the pdf lacks"),
+    ("w1_corners.W1ForgottenHaze", "pdf", "a lobe that is missing from the pdf"),
     ("w1_empirical.W1PhongPlusTwo", "pdf", "the density of lobe 1 is 1.07"),
     ("w1_diffuse.W1UniformTheta", "pdf", "1 / sin_i, within"),
-    ("w1_empirical.W1PhongFlippedUp", "pdf", "from below the horizon that are mirrored up"),
-    ("w1_empirical.W1WardSquare", "energy", "it reflects alpha.x^-1 alpha.y at the normal"),
+    ("w1_empirical.W1PhongFlippedUp", "pdf", "directions below the horizon that are mirrored"),
+    ("w1_empirical.W1WardSquare", "energy", "the albedo at normal incidence is alpha.x^-1 alpha.y"),
     ("w1_diffuse.W1FujiiSign", "energy", "is 1 at sigma = 0"),
-    ("w1_empirical.W1BlinnFourTimes", "energy", "the normalization of the part with ks"),
-    ("w1_layers.W1HalfVectorBase", "energy", "a normalization that holds at the normal only"),
+    ("w1_empirical.W1BlinnFourTimes", "energy", "a wrong normalization of the lobe with ks"),
+    ("w1_layers.W1HalfVectorBase", "energy", "a normalization that holds only at normal incidence"),
     ("w2_plugins_a.W2PluginMaskNull", "calls", "eval_null_transmission is not weight x pdf"),
-    ("w3_forums.W3WeekendBall", "pdf", "depend on wi's angle to the normal alone"),
-    ("w3_narrow.W3RotatedPdf", "pdf", "rotation, and wo too"),
+    ("w3_forums.W3WeekendBall", "pdf", "depends on wi's angle to the normal alone"),
+    ("w3_narrow.W3RotatedPdf", "pdf", "rotation, and the same for wo"),
     ("w3_engines.W3SwappedPdf", "pdf", "the pdf with wo and wi exchanged"),
-    ("w2_smooth_glass.W2GlassFactorSide", "delta", "from inside has the factor 1 / eta^2 inverted"),
+    ("w2_smooth_glass.W2GlassFactorSide", "delta", "for wo inside, the factor 1 / eta^2 of radiance is inverted"),
     ("w2_smooth_glass.W2GlassFirstPower", "delta", "1 / eta in place of 1 / eta^2"),
-    ("w2_smooth_glass.W2GlassWeekend", "delta", "Schlick's curve of the angle there"),
-    ("w2_panes.W2PaneOneWay", "delta", "a tint of one direction only"),
-    ("w2_panes.W2MirrorOneAxis", "delta", "keeps y of wo"),
-    ("w1_microfacet.W1VisibleFullDisk", "pdf", "normals that wo does not see are drawn"),
-    ("w2_plugins_a.W2PluginFrosted", "pdf", "samples have the density of visible normals"),
+    ("w2_smooth_glass.W2GlassWeekend", "delta", "Schlick's approximation is used at the angle of wo"),
+    ("w2_panes.W2PaneOneWay", "delta", "a tint in one direction only"),
+    ("w2_panes.W2MirrorOneAxis", "delta", "has the same y as wo"),
+    ("w1_microfacet.W1VisibleFullDisk", "pdf", "are normals that face away from wo sampled"),
+    ("w2_plugins_a.W2PluginFrosted", "pdf", "samples are drawn from visible normals"),
     ("w3_engines.W3HalfFloat", "pdf", "rounded to 11 bits"),
     ("w1_corners.W1FlooredPdf", "weight", "clamped to at least 0.1"),
-    ("w4_metals.W4Iron", "pdf", "no sample fails, and the pdf lacks"),
-    ("w5_sheets.W5FreeFilm", "energy", "1 - the mean of the reflectance"),
+    ("w4_metals.W4Iron", "pdf", "no sample fails, but int pdf is less than 1"),
+    ("w5_sheets.W5FreeFilm", "energy", "1 - the mean reflectance of the channels"),
     ("w5_sheets.W5Pane", "energy", "that of both faces of a pane"),
-    ("w5_plugins.W5MiTile", "energy", "for wo below the surface no sample carries light"),
+    ("w5_plugins.W5MiTile", "energy", "for wo below the surface, no sample carries light"),
     ("w1_corners.W1SoftTerminator", "reciprocity", "g(wo) / g(wi)"),
     ("w1_diffuse.W1OrenNegative", "positivity", "with azimuths that differ by more than 90"),
 ]

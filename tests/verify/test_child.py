@@ -153,7 +153,7 @@ def test_what_is_printed_is_counted_and_does_not_disturb_json(file: Path) -> Non
 @pytest.mark.slow
 def test_an_answer_that_changes_is_a_failure_that_says_so(file: Path) -> None:
     report = verify(f"{file}:Changes", quick=True, law="calls")
-    assert "the same call twice: " in report["calls"].why[0] and "stochastic = True" in report["calls"].why[0]
+    assert "a repeated call: " in report["calls"].why[0] and "stochastic = True" in report["calls"].why[0]
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def test_junit_counts_and_names_what_failed(report: Report) -> None:
     assert first is not None and (first.get("name"), first.get("file"), first.get("line")) == ("energy", "mine.py", "5")
     failure = first.find("failure")
     assert failure is not None and failure.text is not None
-    assert "100 %" in failure.text and "means: light, 5 % <too much>" in failure.text
+    assert "100 %" in failure.text and "consequence: light, 5 % <too much>" in failure.text
 
 
 def test_annotations_are_one_line_each_and_escaped(report: Report) -> None:
@@ -116,7 +116,7 @@ def test_a_baseline_knows_what_failed_unless_it_is_worse(report: Report, tmp_pat
     assert energy.failed and "worse than in the baseline" in energy.notes[-1]
     energy.status = "pass"
     (mended,) = baseline.apply(report, {("mine.py:Mine, a = 1", "energy"): 0.2})
-    assert mended == "mine.py:Mine, a = 1: energy no longer fails: remove it from the baseline"
+    assert mended == "mine.py:Mine, a = 1: energy no longer fails and can be removed from the baseline"
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"schema": "gonio-baseline/1"}', '{"schema": "x", "cards": 3}'])

@@ -62,7 +62,7 @@ class DimmerAtGrazing(go.Dielectric):
 
 
 class BesideTheMirror(go.Mirror):
-    """Orders of a grating next to the mirror direction: one at -0.02, or two at -0.02 and 0.02."""
+    """Orders of a grating close to the mirror direction: one at -0.02, or two at -0.02 and 0.02."""
 
     orders: ClassVar[int] = 1
 
@@ -92,12 +92,12 @@ def test_lobes_on_both_sides_of_the_mirror_direction_are_a_grating(kind: type[go
     for seed in (1, 2):
         verdict = verify(kind(), quick=True, law="delta", seed=seed)["delta"]
         assert verdict.failed == failed, verdict.why
-        assert failed == ("next to the mirror direction" in " ".join(verdict.why))
+        assert failed == ("close to the mirror direction" in " ".join(verdict.why))
 
 
 def test_light_that_is_lost_on_the_way_is_lost_by_beers_law() -> None:
     verdict = verify(DimmerAtGrazing(alpha=0.0), quick=True, law="delta")["delta"]
-    assert verdict.failed and "where Fresnel's equations" in " ".join(verdict.why), verdict.why
+    assert verdict.failed and "but Fresnel's equations" in " ".join(verdict.why), verdict.why
 
 
 @pytest.mark.sample(1)
@@ -107,8 +107,8 @@ def test_light_that_is_lost_on_the_way_is_lost_by_beers_law() -> None:
         (NoRadianceFactor(alpha=0.0), "1 times as much radiance as power", "the factor 1 / eta^2 is missing"),
         (FactorInPower(alpha=0.0), "1 times as much radiance as power", "power has the factor 1 / eta^2"),
         (ModesExchanged(alpha=0.0), "as much radiance as power", "the two modes are exchanged"),
-        (BentTheWrongWay(alpha=0.0), "not refracted by Snell's law", "Snell's law holds with 1 / eta"),
-        (DimmerFromBehind(), "a turn of the view changes what the lobe carries", ""),
+        (BentTheWrongWay(alpha=0.0), "not refracted according to Snell's law", "Snell's law holds for 1 / eta"),
+        (DimmerFromBehind(), "the light of the lobe changes when wo rotates", ""),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, go.BSDF) else None,
 )

@@ -72,6 +72,7 @@ def test_views_beyond_the_critical_angle_are_named() -> None:
     found = extremes.of_views("weight", wo, below, "not finite", transmits=True)
     assert (
         found is not None
-        and "only for wo below the surface, from 42 degrees to the normal on: total reflection?" in found.words
+        and "only for wo below the surface, at 42 degrees from the normal or more: total internal reflection?"
+        in found.words
     )
     assert extremes.of_views("weight", wo, below | (wo[:, 2] > 0.5), "not finite", transmits=True) is None

@@ -65,7 +65,7 @@ def test_a_mistake_is_caught_and_a_sound_material_passes(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "law", "words"),
     [
-        ("fifth.microfacets.GGXClockwise", "isotropy", "if axes and directions turn together"),
+        ("fifth.microfacets.GGXClockwise", "isotropy", "if axes and directions rotate together"),
         ("fifth.plugins.PhongComponent", "calls", "samples of component 0 alone do not follow its pdf"),
     ],
 )

@@ -54,4 +54,4 @@ def test_report_names_it(tmp_path: Path) -> None:
     )
     (card,) = go.verify(f"{tmp_path / 'mine.py'}:Bad", quick=True, law="positivity").cards
     (verdict,) = card.verdicts
-    assert verdict.cause.endswith("begins with the square root of a negative number in `Bad_eval` (mine.py:9)")
+    assert verdict.cause.endswith("first caused by the square root of a negative number in `Bad_eval` (mine.py:9)")

@@ -111,7 +111,7 @@ def test_the_lobes_probability() -> None:
 def test_weights_without_bound_are_noise() -> None:
     # E[eval / pdf of the lobe picked] is int eval: nothing is lost, but the narrow lobe's weights go as cos^-19
     bias = sampling(NoLobeProbability(), "weights")
-    assert bias.grade is Grade.NOISE and "single samples hold more than" in bias.words
+    assert bias.grade is Grade.NOISE and "individual samples carry more than" in bias.words
 
 
 def test_reciprocity_has_its_closed_form() -> None:
@@ -126,7 +126,7 @@ def test_gain_and_loss_of_the_furnace() -> None:
     verdict = verify(OnePercentMore(), quick=True, law=["energy"])["energy"]
     assert verdict.bias is not None and verdict.bias.kind == "gained"
     assert verdict.bias.average == pytest.approx(0.01, rel=0.1) and verdict.grade in (Grade.SMALL, Grade.VISIBLE)
-    assert any(note.startswith("white furnace gains 0.0100 on average") for note in verdict.notes), verdict.notes
+    assert any(note.startswith("gain in a white furnace: 0.0100 on average") for note in verdict.notes), verdict.notes
     lost = verify(RowAverage(), quick=True, law=["energy"])["energy"].bias
     assert lost is not None and lost.kind == "lost" and 0.02 < lost.average < 0.2
     grazing = verify(NoMasking(), quick=True, law=["energy"])["energy"].bias
@@ -141,12 +141,12 @@ def test_mass_of_the_pdf_where_no_sample_falls_is_noise() -> None:
     from gonio.verify.verdict import Finding
 
     told = Pdf().bias(of(PdfBelow()), Finding(0.1, 1e-3, ""), None, 1)  # type: ignore[arg-type]
-    assert told.grade is Grade.NOISE and "10 % of samples that never occur" in told.words
+    assert told.grade is Grade.NOISE and "int pdf exceeds the fraction of valid samples by 10 %" in told.words
 
 
 def test_nan_is_a_grade_of_its_own() -> None:
     verdict = verify(NanAtTheNormal(), quick=True, law=["positivity"])["positivity"]
-    assert verdict.grade is Grade.NAN and verdict.bias is not None and "single directions" in verdict.bias.words
+    assert verdict.grade is Grade.NAN and verdict.bias is not None and "isolated directions" in verdict.bias.words
     assert "wo is the normal" in verdict.cause
 
 
@@ -174,7 +174,7 @@ def test_the_report_holds_grades_and_a_sound_one_none() -> None:
     assert weight["grade"] == "visible" and weight["bias"]["kind"] == "lost" and weight["cause"]
     assert all(v["grade"] is None and v["bias"] is None and v["cause"] == "" for v in right["verdicts"])
     text = str(report)
-    assert "FAIL visible" in text and "in a picture" in text and "follows from the failure of weight" in text
+    assert "FAIL visible" in text and "effect" in text and "follows from the failure of weight" in text
 
 
 @pytest.mark.slow
@@ -186,7 +186,11 @@ def test_a_declared_breach_is_graded_too() -> None:
 @pytest.mark.slow
 def test_what_is_held_is_judged_alone() -> None:
     verdict = verify(go.mix(go.Lambert(), NoCosine(), 0.5), quick=True, law=["reciprocity"])["reciprocity"]
-    assert verdict.failed and verdict.grade is Grade.INNER and "around a sound one it holds" in verdict.cause
+    assert (
+        verdict.failed
+        and verdict.grade is Grade.INNER
+        and "with a correct inner material, the law holds" in verdict.cause
+    )
 
 
 @pytest.mark.slow

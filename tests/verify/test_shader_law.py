@@ -33,7 +33,7 @@ def test_text_that_differs_fails_with_language_function_and_values(monkeypatch: 
 
     monkeypatch.setattr("gonio.shaders.bundle", wrong)
     found = verify(go.Lambert(0.5), quick=True, law="shader", isolated=False)["shader"]
-    assert found.status == "fail" and "sl, " in found.worst and " expected" in found.worst
+    assert found.status == "fail" and "sl, " in found.worst and " instead of " in found.worst
 
 
 def test_a_material_without_shader_code_is_not_judged() -> None:

@@ -22,7 +22,7 @@ def test_a_gain_is_found_beside_values_that_are_not_finite() -> None:
     )
     assert report["positivity"].failed and report["energy"].failed and report["calls"].status == "pass"
     assert "gain" in report["energy"].why[0] and report["energy"].grade == "broken", report["energy"]
-    assert any("counts as 0" in note for note in report["energy"].notes)
+    assert any("count as 0" in note for note in report["energy"].notes)
 
 
 class SingularLobe(go.Lambert):

@@ -52,7 +52,7 @@ def test_fresnels_figures_differ() -> None:
 def test_a_limit_has_the_unit_of_the_figure() -> None:
     finding = Finding(1.835, 1e-3, "", shown="int pdf = 2.835, wo at 0, 0 degrees", allowed="1.001")
     verdict = decide(Pdf(), of(go.Lambert()), finding, 1e-4, 1)
-    assert verdict.why == ["int pdf = 2.835, wo at 0, 0 degrees, where at most 1.001 is allowed"]
+    assert verdict.why == ["int pdf = 2.835, wo at 0, 0 degrees; at most 1.001 is allowed"]
 
 
 def test_an_exception_that_several_laws_meet_is_reported_once() -> None:
@@ -71,7 +71,7 @@ def test_a_card_is_judged_again_only_where_a_p_value_lies_between(threshold: flo
 
 def test_a_failure_without_a_known_cause_says_so() -> None:
     verdict = Verdict(3, "energy", "albedo <= 1", FAIL, figure=1.2)
-    assert verdict.cause_in_words.startswith("not found")
+    assert verdict.cause_in_words.startswith("unknown")
     assert dataclasses.replace(verdict, cause="the cosine twice").cause_in_words == "the cosine twice"
     assert dataclasses.replace(verdict, figure=None).cause_in_words == ""  # an exception tells itself
     assert dataclasses.replace(verdict, status=PASS).cause_in_words == ""

@@ -13,4 +13,4 @@ turn = dr.arange(mi.Float, n) * (2 * dr.pi / n)
 (s, c), turned = dr.sincos(turn), lambda w: mi.Vector3f(c * w.x - s * w.y, s * w.x + c * w.y, w.z)
 si.wi = turned(si.wi)
 value = bsdf.eval(ctx, si, turned(mi.Vector3f(-0.975860119, 0.113810554, 0.186397865)))[0]
-assert dr.max(value) < 1.05 * dr.min(value), f"{dr.min(value)} to {dr.max(value)} as both directions turn"
+assert dr.max(value) < 1.05 * dr.min(value), f"{dr.min(value)} to {dr.max(value)} as both directions rotate"

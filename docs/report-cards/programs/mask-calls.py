@@ -17,4 +17,4 @@ for ctx.component in range(bsdf.component_count()):
     got = dr.select(dr.any(weight > 0), bs.sampled_component, ctx.component)
     seen[ctx.component] = (dr.min(got)[0], dr.max(got)[0])
 parts, whole = dr.mean(parts, axis=None), dr.mean(whole, axis=None)
-assert all(pair == (k, k) for k, pair in seen.items()) and dr.allclose(parts, whole, 1e-3), f"asked for one component, samples are of {seen}; values sum to {parts}, eval is {whole}"
+assert all(pair == (k, k) for k, pair in seen.items()) and dr.allclose(parts, whole, 1e-3), f"with one component enabled, samples are of {seen}; values sum to {parts}, but eval is {whole}"

@@ -11,4 +11,4 @@ si.dp_du, si.dp_dv, si.t, si.prim_index = [1, 0, 0], [0, 1, 0], 1, 0
 si.wi = mi.Vector3f(0.140627578, 0.10597048, 0.984375)
 bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
 albedo = dr.max(dr.mean(weight, axis=1))
-assert albedo < 1.0006, f"reflects {albedo} times the light it gets"
+assert albedo < 1.0006, f"reflects {albedo} times the incident light"

@@ -12,4 +12,4 @@ si.wi = mi.Vector3f(0.46984631, 0.171010072, 0.866025404)
 bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
 last = dr.max(dr.select(dr.any(weight > 0), bs.sampled_component, 0))
 count, kinds = bsdf.component_count(), [bsdf.flags(k) for k in range(bsdf.component_count())]
-assert dr.all(last < count), f"samples of component {last}, of {count}: {kinds}"
+assert dr.all(last < count), f"sampled_component is {last}, but there are {count} components: {kinds}"

@@ -14,4 +14,4 @@ t, phi = (mi.Float(i >> 12) + 0.5) / 2048 - 1, (mi.Float(i & 4095) + 0.5) * (dr.
 z = t * dr.abs(t)
 wo, area = mi.Vector3f(*(dr.sqrt(1 - z * z) * v for v in (dr.cos(phi), dr.sin(phi))), z), 8 * dr.pi * dr.abs(t) / n
 albedo = dr.max(dr.sum(bsdf.eval(ctx, si, wo) * area, axis=1))
-assert albedo < 1.0959, f"reflects {albedo} times the light it gets"
+assert albedo < 1.0959, f"reflects {albedo} times the incident light"

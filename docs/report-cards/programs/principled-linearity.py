@@ -14,4 +14,4 @@ for v in (0.125, 0.3125, 0.875):
     plugin["base_color"]["value"] = [v, v, v]
     values.append(mi.load_dict(plugin).eval(ctx, si, wo))
 between = 0.75 * values[0] + 0.25 * values[2]
-assert dr.all(dr.abs(values[1] - between) <= 0.054 * between), f"{values[1]} where base_color is between two others, which give {between}"
+assert dr.all(dr.abs(values[1] - between) <= 0.054 * between), f"{values[1]} instead of {between}, with base_color between two other values"

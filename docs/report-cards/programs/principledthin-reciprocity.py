@@ -14,4 +14,4 @@ there = bsdf.eval(ctx, si, wo) / dr.abs(wo.z)
 ctx.mode = mi.TransportMode.Importance  # the same path, followed the other way
 si.wi, wo = wo, mi.Vector3f(si.wi)
 back = bsdf.eval(ctx, si, wo) / dr.abs(wo.z)
-assert dr.all(dr.abs(there - back) <= 0.5 * dr.maximum(there, back)), f"{there} one way, {back} the other"
+assert dr.all(dr.abs(there - back) <= 0.5 * dr.maximum(there, back)), f"{there} in one direction, {back} in the other"

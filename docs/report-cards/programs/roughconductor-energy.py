@@ -15,4 +15,4 @@ z = t * dr.abs(t)
 wo, area = mi.Vector3f(*(dr.sqrt(1 - z * z) * v for v in (dr.cos(phi), dr.sin(phi))), z), 8 * dr.pi * dr.abs(t) / n
 bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
 values, samples = dr.sum(bsdf.eval(ctx, si, wo) * area, axis=1), dr.mean(weight, axis=1)
-assert dr.all(dr.abs(values - samples) < 0.0017), f"values reflect {values}, samples {samples}"
+assert dr.all(dr.abs(values - samples) < 0.0017), f"albedo {values} by eval, {samples} by sample"

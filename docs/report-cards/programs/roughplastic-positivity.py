@@ -13,4 +13,4 @@ wo = mi.Vector3f(0, 0, 1)
 bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
 found = [bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf]
 good = [dr.all(dr.isfinite(v) & (v >= 0), axis=None) for v in found]
-assert dr.all(good, axis=None), f"numbers >= 0, of eval, pdf, weight and its pdf: {good}"
+assert dr.all(good, axis=None), f"valid values of eval, pdf, weight, pdf of the sample: {good}"

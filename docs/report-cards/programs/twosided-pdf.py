@@ -15,5 +15,5 @@ z = t * dr.abs(t)
 wo, area = mi.Vector3f(*(dr.sqrt(1 - z * z) * v for v in (dr.cos(phi), dr.sin(phi))), z), 8 * dr.pi * dr.abs(t) / n
 bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
 claimed = dr.sum(dr.select(mi.Bool(True), bsdf.pdf(ctx, si, wo) * area, 0))
-found = dr.mean(dr.select(dr.any(weight > 0) & (mi.Bool(True)), 1.0, 0.0))
-assert dr.abs(claimed - found) < 0.0013, f"pdf claims {claimed} of all samples, {found} come"
+drawn = dr.mean(dr.select(dr.any(weight > 0) & (mi.Bool(True)), 1.0, 0.0))
+assert dr.abs(claimed - drawn) < 0.0013, f"the pdf integrates to {claimed}, but the fraction of samples is {drawn}"

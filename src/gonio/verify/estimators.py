@@ -19,7 +19,7 @@ from ..energy.albedo import cubature
 from ..material.sample import SampleArrays
 from ..ops import Direction, Mode, Scalar, backend
 from . import directions
-from .severity import ACCURACY, Bias, Grade, percent, seeds, summed, views
+from .severity import ACCURACY, Bias, Grade, degrees, percent, seeds, summed, views
 from .subject import Subject
 
 SAMPLES = 1 << 13  # per wo; stratified, so that the mean is accurate to about 1e-3 of a weight
@@ -253,12 +253,12 @@ def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None 
     if worse.grade is Grade.INVISIBLE and part != "pdf" and light.unseen.max() > 0.01:
         row = int(np.argmax(light.unseen))
         share, theta = percent(float(light.unseen[row])), float(directions.angles(light.wo[row])[0])
-        where = f"single samples hold more than {share} of the light, wo at {theta:.3g} degrees"
+        where = f"individual samples carry more than {share} of the light, wo at {degrees(theta)}"
         return dataclasses.replace(worse, kind="noise", where=where)
     if subject.transmits and light is subject.memo.get("estimates") and worse.grade is Grade.INVISIBLE:
         other = sampling_bias(subject, part, estimate(subject, "importance"))
         if other.average > worse.average:
-            return dataclasses.replace(other, where=f"{other.where}, light tracing")
+            return dataclasses.replace(other, where=f"{other.where}, in light tracing")
     return worse
 
 
@@ -311,5 +311,5 @@ def undefined_bias(subject: Subject, seed: int) -> Bias:
             wrong |= ~np.isfinite(values).all(1).reshape(wrong.shape)
     bad = wrong.mean(1)
     theta = directions.angles(wo[int(np.argmax(bad))])[0]
-    where = f"wo at {theta:.3g} degrees"
+    where = f"wo at {degrees(theta)}"
     return Bias(float(bad.max()), float(mass @ bad), float(mass[bad > 0.01].sum()), where, "nan")

@@ -107,7 +107,7 @@ class SampleCells:
         figure.colorbar(shown, ax=axes[2], shrink=0.85, label="standard deviations").outline.set_visible(False)
         caption = (
             f"{self.drawn:,} samples for the wo with the lowest p-value, projected along the normal, around the lobe. "
-            "The difference is noise where the law holds."
+            "If the law holds, the difference is only noise."
         )
         return _svg(figure), caption
 
@@ -155,12 +155,12 @@ class AlbedoCurves:
             _label(
                 axes[1],
                 "angle of wo, degrees",
-                "share of light lost",
+                "fraction of light lost",
                 f"white furnace: {'gains' if self.loss < 0.0 else 'loses'} {abs(self.loss):.4f} on average",
             )
         return (
             _svg(figure),
-            "Above the dotted line at 1, more light is reflected than arrives. Error bars are three standard errors.",
+            "Above the dotted line at 1, more light is reflected than arrives. Error bars show three standard errors.",
         )
 
 
@@ -193,7 +193,7 @@ class ReciprocityMap:
         bar.outline.set_visible(False)
         return (
             _svg(figure),
-            "Largest relative difference over eight azimuths of f with the two directions exchanged.",
+            "Relative difference between f(wo, wi) and f(wi, wo), the largest over eight azimuths.",
         )
 
 
@@ -218,4 +218,4 @@ class RoundingErrors:
         axes[0].set_xscale("log")
         axes[0].set_yscale("log")
         _label(axes[0], "smaller of the two cosines", "relative error of float32")
-        return _svg(figure), "float32 against float64 per pair of directions; the 400 worst in red."
+        return _svg(figure), "Relative error of float32 for each pair of directions; the 400 largest errors are red."

@@ -121,7 +121,9 @@ def direction(probe: Probe) -> Misses:
         close = oblique & ~exact & ~paired & (np.abs(i - mirror)[:, :2].max(1) < 0.1)
         if close.sum() < CLOSE * oblique.sum():
             continue  # the lobe only crosses the mirror direction at some views
-        yield _miss(np.abs(i - mirror).max(1) * close, "a lobe next to the mirror direction", o, i)
+        yield _miss(
+            np.abs(i - mirror).max(1) * close, "a reflected lobe is close to the mirror direction, but not in it", o, i
+        )
 
 
 def _opposite_order(o: np.ndarray, i: np.ndarray) -> np.ndarray:
@@ -134,13 +136,13 @@ def _opposite_order(o: np.ndarray, i: np.ndarray) -> np.ndarray:
 def _snell(o: np.ndarray, i: np.ndarray, eta: np.ndarray, refracted: np.ndarray) -> Miss:
     off = np.abs(i[:, :2] + o[:, :2] / eta[:, None]).max(1) * refracted
     inverse = np.abs(i[:, :2] + o[:, :2] * eta[:, None]).max(1) * refracted
-    text, cause = "not refracted by Snell's law with the eta of the sample", ""
+    text, cause = "not refracted according to Snell's law for eta of the sample", ""
     wrong = off > SINGLE
     if wrong.any() and np.abs(i + o)[wrong].max() < SINGLE:
-        cause = "the light passes straight on, and its `eta` is not 1: that of another lobe?"
+        cause = "the light passes straight through, but `eta` is not 1: is it that of another lobe?"
     elif wrong.any() and inverse[wrong].max() < SINGLE:
-        text += ", but with 1 / eta"
-        cause = "Snell's law holds with 1 / eta: refracted the wrong way, or `eta` is that of the other side?"
+        text += ", but for 1 / eta"
+        cause = "Snell's law holds for 1 / eta: is the refraction inverted, or `eta` that of the other side?"
     return _miss(off, text, o, i, cause)
 
 
@@ -151,8 +153,8 @@ def _unstated_index(o: np.ndarray, i: np.ndarray, straight: np.ndarray) -> Misse
     index = sin_o[usable] / sin_i[usable]
     if len(index) > 3 and np.ptp(index) < 1e-3 * index.mean() and abs(index.mean() - 1.0) > FLAT:
         size = np.where(usable, abs(index.mean() - 1.0), 0.0)
-        text = f"refracted by an index of {index.mean():.4g}, with eta = 1 in the samples"
-        yield _miss(size, text, o, i, "`eta` of transmitted samples is left at 1?")
+        text = f"refracted with an index of {index.mean():.4g}, but eta of the samples is 1"
+        yield _miss(size, text, o, i, "is `eta` of transmitted samples left at 1?")
 
 
 def indices(probe: Probe) -> Misses:
@@ -170,7 +172,7 @@ def indices(probe: Probe) -> Misses:
         if named is not None:
             off[through] = np.abs(above / named - 1.0)
             stated, expected = distinct(float(above[np.argmax(np.abs(above / named - 1.0))]), named)
-            yield _miss(off, f"eta, from above, is {stated}, and {expected} by the parameters", o, i)
+            yield _miss(off, f"eta from above is {stated}, but {expected} according to the parameters", o, i)
         elif np.ptp(above) > FLAT * np.median(above):
             off[through] = np.abs(above / np.median(above) - 1.0)
             yield _miss(off, "eta from below is not the inverse of that from above", o, i)
@@ -207,7 +209,7 @@ def modes(probe: Probe) -> Misses:
         row = int(np.argmax(off))
         ratio, expected = distinct(float(radiance[row].mean() / max(power[row].mean(), 1e-12)), float(factor[row]))
         verb = "transmits" if through[row] else "reflects"
-        text = f"{verb} {ratio} times as much radiance as power, {expected} expected (1 / eta^2)"
+        text = f"{verb} {ratio} times as much radiance as power instead of {expected} (1 / eta^2)"
         total = np.sum(probe.power.carried[rows] * probe.power.valid[rows][..., None], axis=1)
         cause = _power_of_index(radiance, power, eta, through & exists, total)
         cause = cause or _one_side(radiance, power, eta, through & exists, o[:, 2] > 0.0)
@@ -230,18 +232,17 @@ def _power_of_index(
         return bool(np.all(np.abs(full - carried + scale * carried - 1.0) < 1e-3))
 
     for exponent, right, wrong in (
-        (-1.0, "1 / eta in place of 1 / eta^2", "power has a factor of the index, which no light has"),
-        (0.0, "the factor 1 / eta^2 is missing", "power has the factor 1 / eta^2, which only radiance has"),
+        (-1.0, "1 / eta in place of 1 / eta^2", "power has a factor eta that it should not have"),
+        (0.0, "the factor 1 / eta^2 is missing", "power has the factor 1 / eta^2, which only radiance should have"),
         (2.0, "the factor 1 / eta^2 is inverted", "the two modes are exchanged"),
-        (-4.0, "the factor 1 / eta^2 is applied twice", "power has the factor eta^2, which no light has"),
+        (-4.0, "the factor 1 / eta^2 is applied twice", "power has a factor eta^2 that it should not have"),
     ):
         if np.all(np.abs(ratio / eta[usable] ** exponent - 1.0) < 1e-3):
             of_power = not conserved(1.0) and conserved(squared if exponent >= 0.0 else 1.0 / squared)
             text = "1 / eta" if exponent == -1.0 else f"eta^{exponent:g}" if exponent else "1"
             known = of_power or conserved(1.0)
-            return (
-                f"radiance over power is {text}: {wrong if of_power else right if known else f'{right}, or {wrong}'}?"
-            )
+            guess = wrong if of_power else right if known else f"{right}, or {wrong}"
+            return f"the ratio of radiance to power is {text}: {guess}?"
     return ""
 
 
@@ -253,9 +254,14 @@ def _one_side(radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: 
         if min(a.sum(), b.sum()) < 4 or np.abs(eta[b] - 1.0).max() < FLAT:
             continue
         if np.all(np.abs(ratio[a] * eta[a] ** 2.0 - 1.0) < 1e-3):
-            for exponent, text in ((2.0, "inverted"), (0.0, "missing"), (-4.0, "applied twice"), (-1.0, "1 / eta")):
+            for exponent, text in (
+                (2.0, "inverted"),
+                (0.0, "missing"),
+                (-4.0, "applied twice"),
+                (-1.0, "replaced by 1 / eta"),
+            ):
                 if np.all(np.abs(ratio[b] / eta[b] ** exponent - 1.0) < 1e-3):
-                    return f"radiance from {name} has the factor 1 / eta^2 {text}, that from the other side is right?"
+                    return f"for wo {name}, the factor 1 / eta^2 of radiance is {text}, but correct for the other side"
     return ""
 
 
@@ -269,12 +275,12 @@ def way_back(probe: Probe) -> Misses:
             continue
         o, i, there = o[fine], i[fine], there[fine]
         back, exists = lobes.along(lobes.of(probe.subject, i, probe.seed, "importance"), o)
-        yield _miss(np.where(exists, 0.0, np.inf), "a lobe leads along wi, and none leads back from there", o, i)
+        yield _miss(np.where(exists, 0.0, np.inf), "a lobe leads from wo to wi, but none leads back", o, i)
         off = _relative(there, back) * exists
         row = int(np.argmax(off))
         one_way, other_way = distinct(there[row].mean(), back[row].mean())
         cause = _of_way_back(probe, o, there, back, exists & (o[:, 2] * i[:, 2] < 0.0))
-        yield _miss(off, f"carries {one_way} of the power one way and {other_way} the other", o, i, cause)
+        yield _miss(off, f"carries {one_way} of the power from wo to wi, but {other_way} back", o, i, cause)
 
 
 def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarray, through: np.ndarray) -> str:
@@ -289,7 +295,7 @@ def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarra
         ratio = there[rows] / back[rows]
         if rows.sum() >= 4 and np.ptp(ratio, axis=0).max() < 1e-3 * ratio.max():
             color = ", ".join(f"{c:.3g}" for c in np.median(ratio, axis=0))
-            return f"light from {where} carries ({color}) times what the way back does: a tint of one direction only?"
+            return f"light from {where} carries ({color}) times the power of its reverse: a tint in one direction only?"
     reflected = np.sum(power.carried * (power.valid & ~power.through(wo))[..., None], axis=1).mean(1)
     eta = np.sum(power.eta * power.through(wo), axis=1)
     for side, where in ((1.0, "outside"), (-1.0, "inside")):
@@ -299,9 +305,7 @@ def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarra
             continue
         r0 = float(np.sum((reflected[rows] - x) * (1.0 - x)) / np.sum((1.0 - x) ** 2))  # fit of r0 + (1 - r0) x
         if np.abs(r0 + (1.0 - r0) * x - reflected[rows]).max() < 1e-5:
-            return (
-                f"from {where} it reflects by Schlick's curve of the angle there: that of the transmitted angle is due?"
-            )
+            return f"from {where}, Schlick's approximation is used at the angle of wo instead of the transmitted angle"
     return ""
 
 
@@ -337,11 +341,11 @@ def fresnel(probe: Probe) -> Misses:
     row = int(np.argmax(off))
     channel = int(np.argmax(np.abs(carried[verb][row] - expected[row])))
     cause = ""
-    for other, words in ((ratio**-1.0, "of the other side's index"), (ratio**2.0, "of the index squared")):
+    for other, words in ((ratio**-1.0, "for the index of the other side"), (ratio**2.0, "for the square of the index")):
         if max(off.max() for off, _ in against(dielectric(cosine, other)).values()) < 1e-4:
-            cause = f"it reflects by Fresnel's equations {words}?"
+            cause = f"the reflectance follows Fresnel's equations {words}"
     value, right = distinct(float(carried[verb][row, channel]), float(expected[row, channel]))
-    text = f"{verb} {value} of the light, where Fresnel's equations for eta = {index:.4g} give {right}"
+    text = f"{verb} {value} of the light, but Fresnel's equations for eta = {index:.4g} give {right}"
     worst = np.maximum(exact["reflects"][0], exact["transmits"][0])
     yield _miss(worst, text, wo, wo * [-1.0, -1.0, 1.0], cause)
 
@@ -388,11 +392,16 @@ def rotation(probe: Probe) -> Misses:
         other, exists = lobes.along(lobes.rows_of(rotated, rows), directions.rotated(i, angle[rows]))
         lost = np.where(exists | (carried.max(1) < FORWARD), 0.0, np.inf)
         cause = next(
-            (f"the sampled direction keeps {k} of wo: a sign?" for k, m in KEPT if np.abs(i - o * m).max() < 1e-4), ""
+            (
+                f"the sampled direction has the same {k} as wo: a wrong sign?"
+                for k, m in KEPT
+                if np.abs(i - o * m).max() < 1e-4
+            ),
+            "",
         )
-        yield _miss(lost, "declared isotropic, but a turn of the view moves the lobe", o, i, cause)
+        yield _miss(lost, "declared isotropic, but the lobe does not rotate with wo", o, i, cause)
         off = _relative(carried, other) * exists
-        yield _miss(off, "declared isotropic, but a turn of the view changes what the lobe carries", o, i)
+        yield _miss(off, "declared isotropic, but the light of the lobe changes when wo rotates", o, i)
 
 
 def tint(probe: Probe) -> Misses:
@@ -435,9 +444,14 @@ def float32(probe: Probe) -> Misses:
         exact, _ = lobes.along(lobes.rows_of(probe.radiance, rows), i)
         single, exists = lobes.along(lobes.rows_of(rounded, rows), i)
         matters = (np.abs(i[:, 2]) > 0.05) & (exact.max(1) > FORWARD)
-        yield _miss(np.where(exists | ~matters, 0.0, np.inf), "float32 has no such lobe", o, i)
+        yield _miss(np.where(exists | ~matters, 0.0, np.inf), "the lobe is missing in float32", o, i)
         off = _relative(single, exact) * (exists & matters)
-        yield _miss(np.where(off > SINGLE, off, 0.0), "float32 carries another share of the light than float64", o, i)
+        yield _miss(
+            np.where(off > SINGLE, off, 0.0),
+            "in float32, the lobe carries a different fraction of the light than in float64",
+            o,
+            i,
+        )
 
 
 # --------------------------------------------------------------------------- derivatives
@@ -478,7 +492,7 @@ def derivatives(probe: Probe) -> Misses:
             exact, lit = _autodiff(functools.partial(carried, {leaf.path: own[leaf.path]}), len(many))
         size = float(np.max(np.abs(np.asarray(leaf.value, float)))) or 1.0
         off = _slope_error(exact, lit, functools.partial(carried, own), size)
-        text = f"the derivative by {leaf.path} of the light of the lobe differs from finite differences"
+        text = f"the derivative of the lobe's light with respect to {leaf.path} differs from finite differences"
         yield _miss(np.where(off > SLOPES, off, 0.0), text, many, many * [-1.0, -1.0, 1.0])
 
 

@@ -138,25 +138,23 @@ def _card(card: Card, number: int) -> str:
 
 
 def _detail(v: Verdict, anchor: str) -> str:
-    rows: list[tuple[str, str]] = [("why", html.escape(line)) for line in v.why]
+    rows: list[tuple[str, str]] = [("reason", html.escape(line)) for line in v.why]
     rows.append(("figure", html.escape(v.shown)))
     rows.append(("tolerance", html.escape(v.reason)))
     if v.p is not None:
-        rows.append(("lowest p", f"{v.p:.3g}"))
+        rows.append(("lowest p-value", f"{v.p:.3g}"))
     rows += [("note", html.escape(note)) for note in v.notes]
     if v.worst:
         rows.append(("worst case", html.escape(v.worst)))
     rows.append(("reproduce", f"<pre>{html.escape(v.command)}</pre>"))
     if v.failed or v.excused or v.status == DECLARED:
-        rows.append(
-            ("in a picture", html.escape(f"{v.bias.words[:1].upper()}{v.bias.words[1:]}" if v.bias else v.meaning))
-        )
+        rows.append(("effect", html.escape(f"{v.bias.words[:1].upper()}{v.bias.words[1:]}" if v.bias else v.meaning)))
         if v.bias:
-            rows.append(("means", html.escape(v.meaning)))
+            rows.append(("consequence", html.escape(v.meaning)))
     if v.cause_in_words:
         rows.append(("cause", html.escape(v.cause_in_words)))
     if v.reproduction:
-        program = f"<summary>a program that needs only Mitsuba</summary><pre>{html.escape(v.reproduction)}</pre>"
+        program = f"<summary>program that needs only Mitsuba</summary><pre>{html.escape(v.reproduction)}</pre>"
         rows.append(("without Gonio", f"<details>{program}</details>"))
     text = "".join(f"<dt>{name}<dd>{value}" for name, value in rows)
     drawn = ""

@@ -1,7 +1,7 @@
 """The quality of a BSDF's sampling: measurements, not verdicts.
 
     gonio models --quality
-    go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % of samples lost, variance 0.013, ..."
+    go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % of samples fail, ..."
 
 A path tracer multiplies by the weight of each sample, so the variance of the weight is noise in the picture, and a
 failed sample is a wasted path. Both can be high even if every law holds.
@@ -50,7 +50,7 @@ class Quality:
 
     @property
     def words(self) -> str:
-        """The measures as text: "sampling: 2.1 % of samples lost, variance 0.04, ..."."""
+        """The measures as text: "sampling: 2.1 % of samples fail, variance of the weight 0.04, ..."."""
         return "sampling: " + ", ".join(text for text in self.texts if text)
 
     @property
@@ -58,8 +58,8 @@ class Quality:
         """The four measures as text; "" for one that is None."""
         failed, variance, cosine, ideal = self.numbers
         return (
-            f"{failed} of samples lost",
-            f"variance {variance}",
+            f"{failed} of samples fail",
+            f"variance of the weight {variance}",
             cosine and f"{cosine} times as efficient as cosine sampling",
             f"{ideal} of the ideal efficiency",
         )

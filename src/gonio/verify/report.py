@@ -103,7 +103,11 @@ class Report:
         for line in self.mended:
             console.print(f"fixed: {line}", markup=False)
         broken = len(self.failures)
-        word = f"[green]{self._holding()}[/]" if not broken else f"[bold red]{broken} violated[/]"
+        word = (
+            f"[green]{self._holding()}[/]"
+            if not broken
+            else f"[bold red]{broken} {'law' if broken == 1 else 'laws'} violated[/]"
+        )
         if self.unread:
             word = f"[bold red]{len(self.unread)} not read[/], {word}"
         if self.untried:
@@ -119,9 +123,15 @@ class Report:
         declared = dict.fromkeys(law for law, status in statuses if status == DECLARED)
         sound = [law for law in judged if law not in declared and law not in self.untried]
         if all(law.name in sound or law.name in declared for law in chosen(None)):
-            return "all laws hold" + (f", but {' and '.join(declared)} as declared" if declared else "")
+            return "all laws hold" + (
+                f" except {' and '.join(declared)}, which {'is' if len(declared) == 1 else 'are'} violated as declared"
+                if declared
+                else ""
+            )
         holding = f"{' and '.join(sound)} hold{'s' if len(sound) == 1 else ''}" if sound else ""
-        breaking = f"{' and '.join(declared)} break{'s' if len(declared) == 1 else ''} as declared" if declared else ""
+        breaking = (
+            f"{' and '.join(declared)} {'is' if len(declared) == 1 else 'are'} violated as declared" if declared else ""
+        )
         return ", ".join(filter(None, [holding, breaking]))
 
     def __str__(self) -> str:

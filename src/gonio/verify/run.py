@@ -244,7 +244,11 @@ def _preliminary(all_: list[Asked], declared: bool) -> str:
         return "does not apply" if all(one.status == NOT_APPLICABLE for one in verdicts) else "not tried"
     tests = sum(len(one.trials) for one in findings)
     places = f"{len(findings)} {'setting' if len(findings) == 1 else 'settings'}"
-    return f"{tests} tests at {places} still undecided" if tests else f"holds at {places}"
+    return (
+        f"{tests} statistical {'test' if tests == 1 else 'tests'} at {places} pending"
+        if tests
+        else f"holds at {places}"
+    )
 
 
 def _places(one: Subject, effort: str, seed: int) -> list[Place]:
@@ -297,7 +301,7 @@ def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[V
         if not failed:
             answer, where = verdict, asked
             answer.why = [f"at {asked.place.words}: {line}" for line in answer.why]
-            answer.notes.insert(0, f"at the given values: {first.status}")
+            answer.notes.insert(0, f"verdict at the given parameter values: {first.status}")
         failed.append(asked)
         if len(failed) == 3:
             break
@@ -340,7 +344,7 @@ def decide(
         if trial.second < CONFIRMATION:
             statistical.append(f"{trial.where}: p = {trial.p:.2g}, and {trial.second:.2g} with a second seed")
         else:
-            text = f"{trial.where}: p = {trial.p:.2g} is due to chance: {trial.second:.2g} with a second seed"
+            text = f"{trial.where}: p = {trial.p:.2g} was due to chance ({trial.second:.2g} with a second seed)"
             finding.notes.append(text)
     over = not finding.figure <= finding.tolerance
     status = FAIL if why or statistical or over else PASS
@@ -351,12 +355,12 @@ def decide(
             pass
         elif not over:
             if breach.certain and (place is None or place.why == "given"):
-                status, why = (FAIL, ["the law is declared to be violated, but holds: " + breach.reason])
+                status, why = (FAIL, ["a violation is declared, but the law holds: " + breach.reason])
         elif size <= breach.size * (1.0 + 1e-6) + finding.tolerance:
             status = DECLARED
-            finding.notes.insert(0, f"declared: {breach.reason} (at most {breach.size:.4g})")
+            finding.notes.insert(0, f"declared violation: {breach.reason} (at most {breach.size:.4g})")
         else:
-            why.append(f"the violation, {size:.4g}, is more than the declared {breach.size:.4g}: {breach.reason}")
+            why.append(f"the violation of {size:.4g} exceeds the declared {breach.size:.4g}: {breach.reason}")
     elif over:
         why += _exceeds(finding, law.name in getattr(one.model, "known_violations", {}))
     why += statistical
@@ -391,8 +395,9 @@ def _exceeds(finding: Finding, declared: bool) -> list[str]:
     declared  whether a violation is declared for other parameters
     """
     figure = finding.shown or f"{finding.figure:.3g}"
-    words = [f"{figure}, where at most {finding.allowed or f'{finding.tolerance:.3g}'} is allowed"]
-    return words + ["a violation is declared, but its size is 0 with these parameters"] * declared
+    allowed = finding.allowed or (f"{finding.tolerance:.3g}" if finding.tolerance else "")
+    words = [f"{figure}; {f'at most {allowed}' if allowed else 'none'} is allowed"]
+    return words + ["a violation is declared, but with size 0 for these parameter values"] * declared
 
 
 def _subjects(targets: Sequence[BSDF | Subject | str], vary: str) -> list[Subject]:

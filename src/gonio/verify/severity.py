@@ -91,23 +91,25 @@ class Bias:
     def words(self) -> str:
         """The bias as text: "loses 4.8 % of the reflected light on average, 12 % at worst (wo at 85 degrees), ..."."""
         if self.kind == "noise":
-            return f"samples are wasted, but nothing is biased: {self.where}"
+            return f"wastes samples without bias: {self.where}"
         if self.kind == "interface":
-            return f"pictures of a plain path tracer do not change: {self.where}"
+            return f"pictures of a plain path tracer are correct; {self.where}"
         if self.kind == "derivatives" and not self.average:
-            return f"no picture is wrong; derivatives are not finite: {self.where}"
+            return f"pictures are correct, but derivatives are not finite: {self.where}"
         if self.kind == "derivatives":
-            return f"no picture is wrong; derivatives are off by {percent(self.average)} on average: {self.where}"
+            return (
+                f"pictures are correct, but derivatives are wrong by {percent(self.average)} on average: {self.where}"
+            )
         if self.kind == "nan":
             if not self.worst:
-                return f"NaN at single directions only: {self.where}"
-            text = f"values are not finite or negative for {percent(self.average)} of all pairs of directions"
+                return f"NaN at isolated directions only: {self.where}"
+            text = f"values are negative or not finite for {percent(self.average)} of all pairs of directions"
             return f"{text}, {percent(self.worst)} at worst ({self.where})"
         verb = {"lost": "loses", "gained": "gains", "bias": "is wrong by"}[self.kind]
         text = f"{verb} {percent(self.average)} of the reflected light on average, {percent(self.worst)} at worst"
         text += f" ({self.where})"
         if self.share:
-            text += f", more than 1 % over {percent(self.share)} of directions"
+            text += f", more than 1 % for {percent(self.share)} of directions wo"
         if self.furnace is not None and self.furnace < 0.9 * self.average:
             text += f"; {percent(self.furnace)} under uniform light"
         if self.both is not None and abs(self.both - self.average) > 0.1 * self.average:
@@ -120,6 +122,12 @@ def percent(share: float) -> str:
     if share > 100.0:
         return "more than 10,000 %"
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
+
+
+def degrees(theta: float) -> str:
+    """An angle in degrees as text: "1 degree", "82 degrees"."""
+    number = f"{theta:.3g}"
+    return f"{number} degree{'' if number == '1' else 's'}"
 
 
 # --------------------------------------------------------------------------- over directions
@@ -160,7 +168,7 @@ def summed(
     if kind is None:
         kind = "bias" if abs(float(mass @ signed)) < 0.9 * average else "lost" if signed[row] < 0.0 else "gained"
     theta = float(directions.angles(wo[row])[0])
-    place = f"wo at {theta:.3g} degrees"
+    place = f"wo at {degrees(theta)}"
     if off.shape[1] == 3 and np.ptp(relative[row]) > 0.1 * size[row]:
         place += f", in {('red', 'green', 'blue')[int(channel[row])]}"
     return Bias(float(size[row]), average, float(mass[size > 0.01].sum()), f"{place}{where}", kind)

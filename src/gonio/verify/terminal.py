@@ -80,19 +80,19 @@ def _explain(verdict: Verdict, console: Console) -> None:
     from rich.text import Text
 
     console.print(Text(f"{verdict.law}: ", style="bold red").append(verdict.title, style="default not bold"))
-    rows = [("why", line) for line in verdict.why] + [("note", line) for line in verdict.notes]
+    rows = [("reason", line) for line in verdict.why] + [("note", line) for line in verdict.notes]
     rows += [
-        ("in a picture", verdict.bias.words if verdict.bias else ""),
+        ("effect", verdict.bias.words if verdict.bias else ""),
         ("cause", verdict.cause_in_words),
-        ("worst", verdict.worst),
-        ("means", verdict.meaning),
+        ("worst case", verdict.worst),
+        ("consequence", verdict.meaning),
         ("tolerance", verdict.reason),
-        ("again", verdict.command),
+        ("reproduce", verdict.command),
     ]
     for name, line in rows:
         if line:
             console.print(
-                Text(f"  {name:>12}  ", style="cyan").append(line, style="default"), soft_wrap=name == "again"
+                Text(f"  {name:>12}  ", style="cyan").append(line, style="default"), soft_wrap=name == "reproduce"
             )
     console.print()
 

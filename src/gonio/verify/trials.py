@@ -49,7 +49,7 @@ def trial(
     hashes = {name: facts.file_hash(path) for name, path in names.items()}
     with parts.job("verify", task, sorted(hashes.items()), facts.code()) as job:
         if job.found and progress:
-            progress(0, len(task.items), f"resuming a trial of which {job.found} parts are done")
+            progress(0, len(task.items), f"resuming a trial; {job.found} parts are done")
         judged = _judged(task, range(len(task.items)), None, limit, memory, hashes, progress)
         tests = sum(len(card.p_values) for cards in judged.values() for card in _cards(cards))
         threshold = significance(tests)

@@ -136,7 +136,7 @@ class Verdict:
     def cause_in_words(self) -> str:
         """The probable mistake that caused a failure, or the statement that it was not found."""
         unknown = self.failed and self.figure is not None  # an exception explains itself
-        return self.cause or ("not found: it is none of the known mistakes" if unknown else "")
+        return self.cause or ("unknown; none of the known mistakes matches" if unknown else "")
 
     @property
     def excused(self) -> bool:

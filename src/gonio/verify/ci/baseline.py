@@ -73,11 +73,11 @@ def apply(report: Report, known: Known) -> list[str]:
             if key not in known:
                 continue
             if not verdict.failed:
-                fixed.append(f"{card.title}: {verdict.law} no longer fails: remove it from the baseline")
+                fixed.append(f"{card.title}: {verdict.law} no longer fails and can be removed from the baseline")
             elif _no_worse(verdict, known[key]):
                 verdict.status = KNOWN
             else:
-                now = verdict.shown or "no figure"
+                now = verdict.shown or "no measured value"
                 verdict.notes.append(f"worse than in the baseline: {now}, {_words(known[key])}")
     return fixed
 
@@ -90,7 +90,7 @@ def _no_worse(verdict: Verdict, before: float | None) -> bool:
 
 
 def _words(before: float | None) -> str:
-    return "no figure before" if before is None else f"{before:.3g} before"
+    return "no measured value before" if before is None else f"{before:.3g} before"
 
 
 __all__ = ["apply", "read", "text"]

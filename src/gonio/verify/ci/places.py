@@ -74,11 +74,11 @@ def words(verdict: Verdict) -> list[str]:
     """The failure, its meaning and the command that repeats it, one line each."""
     lines = list(verdict.why) or ([verdict.notes[0]] if verdict.notes else [])
     for name, text in (
-        ("likely cause", cause(verdict)),
+        ("probable cause", cause(verdict)),
         ("grade", grade(verdict)),
-        ("worst", verdict.worst),
-        ("means", verdict.meaning),
-        ("again", verdict.command),
+        ("worst case", verdict.worst),
+        ("consequence", verdict.meaning),
+        ("reproduce", verdict.command),
     ):
         if text:
             lines.append(f"{name}: {text}")

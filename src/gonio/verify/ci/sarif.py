@@ -102,7 +102,7 @@ def _result(card: Card, verdict: Verdict, rule: int) -> dict[str, Any]:
         result["baselineState"] = "unchanged"
         result["suppressions"] = [{"kind": "external", "justification": "known from the baseline"}]
     elif verdict.excused:
-        result["suppressions"] = [{"kind": "external", "justification": "tolerated: no picture shows it"}]
+        result["suppressions"] = [{"kind": "external", "justification": "tolerated: its effect on pictures is small"}]
     elif verdict.status == DECLARED:
         result["suppressions"] = [{"kind": "inSource", "justification": "the BSDF declares it"}]
     return result

@@ -47,14 +47,14 @@ def named(ratio: Ratio) -> Cause | None:
         return clamp
     if region is None:
         # a single channel counts as a region too
-        text = f"{ratio.name} is 1 but {words}"
+        text = f"{ratio.name} differs from 1 {words}"
         return Cause(text, text) if words and bad.mean() > COVER else _part(ratio)
     place, rows = region
     words = f"{words} and {place}".removeprefix(" and ") if words else place
     inside = fitted(ratio.take(np.flatnonzero(rows)))
     if inside is not None:
         return _cause(ratio, inside, words)
-    text = f"{ratio.name} is 1 everywhere else, and wrong {words}"
+    text = f"{ratio.name} differs from 1 only {words.removeprefix('only ')}"
     return Cause(text, text)
 
 
@@ -62,7 +62,8 @@ def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
     """A cause if one of the two values is constant, at the end of its range, wherever they differ."""
     if not 0.003 < bad.mean() < 0.97 or bad.sum() < FEWEST or np.ptp(ratio.wi[bad], axis=0).max() < 0.1:
         return None  # for a single direction, all values are equal
-    for values, other, name in ((ratio.above, ratio.below, ratio.top), (ratio.below, ratio.above, ratio.bottom)):
+    sides = (ratio.above, ratio.below, ratio.top, ratio.bottom), (ratio.below, ratio.above, ratio.bottom, ratio.top)
+    for values, other, name, against in sides:
         clamped, right = values[bad].max(1), other[bad].max(1)
         middle = float(np.median(clamped))
         if middle <= 0.0 or np.mean(np.abs(clamped / middle - 1.0) < 1e-4) < 0.99:
@@ -75,7 +76,7 @@ def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
             ("at least", right < clamped, rest >= middle * 0.999),
         ):
             if side.mean() > 0.99 and bound.mean() > 0.99:
-                text = f"{name} is {middle:.4g} wherever the other is {'larger' if word == 'at most' else 'smaller'}"
+                text = f"{name} is {middle:.4g} wherever {against} is {'larger' if word == 'at most' else 'smaller'}"
                 return Cause(f"{text}: clamped to {word} {middle:.4g}?", f"{name} clamped")
     return None
 
@@ -87,7 +88,7 @@ def _part(ratio: Ratio) -> Cause | None:
     above, below = ratio.above[:, 0], ratio.below[:, 0]
     for less, more, name, other in ((above, below, ratio.top, ratio.bottom), (below, above, ratio.bottom, ratio.top)):
         if np.mean(less > more * (1.0 + 10.0 * tolerance(ratio))) < 1e-3 and np.mean(less < 0.95 * more) > 0.2:
-            text = f"{name} never exceeds {other}, and is less for many directions: a missing lobe of a mixture?"
+            text = f"{name} never exceeds {other} and is often smaller: is a lobe of a mixture missing?"
             return Cause(text, f"{name} part")
     return None
 
@@ -128,8 +129,8 @@ def nothing_below(
     if bad.sum() < max(FEWEST, 5e-3 * len(bad)):
         return None
     place = place_of(wo[lit], wi[lit], bad[lit])
-    words = f"{top} is positive and {bottom} is 0 {place}"
-    return Cause(f"{words}, at {bad[lit].mean():.2g} of the directions", words) if place else None
+    words = f"{top} is positive but {bottom} is 0 {place}"
+    return Cause(f"{words}, for {bad[lit].mean():.2g} of the directions", words) if place else None
 
 
 def _off(ratio: Ratio) -> np.ndarray:

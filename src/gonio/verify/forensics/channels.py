@@ -28,8 +28,6 @@ def mixed(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Cause | None:
         size = np.maximum(one, other)
         lit = np.isfinite(one) & np.isfinite(other) & (size > 1e-6 * np.max(size, initial=0.0, where=np.isfinite(size)))
         if lit.any() and np.mean(np.abs(one - other)[lit] > MIXED * size[lit]) > 0.05:
-            words = f"red values change with the green and blue of {name}"
-            return Cause(
-                f"{words}: a mean, a maximum or a luminance where each channel's own value is due?", "channels"
-            )
+            words = f"the red channel of the result depends on the green and blue channels of {name}"
+            return Cause(f"{words}: a mean, a maximum or a luminance in place of the channel itself?", "channels")
     return None

@@ -30,6 +30,7 @@ FULL = 25.0  # smallest expectation of a block
 EFFECT = 0.02  # RMS of the relative difference of samples and expectation below which they agree
 KNOWN = 0.004  # tolerance of a known number; 2^17 samples determine a scale to a third of a percent
 DRAWN, LOST = 1 << 14, 0.02  # samples, and the accuracy of the fraction of them that fail
+OVER = "the ratio of samples to pdf is"
 BEFORE = 0.08  # smallest difference whose cause is determined
 
 
@@ -94,7 +95,7 @@ def crowd(subject: Subject, held: Blocks) -> str:
         amount = f"{severity.percent(abs(o / e - 1.0))} {'more' if o > e else 'fewer'} samples than the pdf predicts"
     cells = f"in cells with {severity.percent(share)} of the light"
     theta_o, phi_o = directions.angles(held.wo)
-    return f"{amount} near wi {theta:.3g}, {phi:.3g} degrees, {cells}, for wo {theta_o:.3g}, {phi_o:.3g}"
+    return f"{amount} near wi at {theta:.3g}, {phi:.3g} degrees, {cells}, for wo at {theta_o:.3g}, {phi_o:.3g} degrees"
 
 
 # --------------------------------------------------------------------------- the factor that would remove it
@@ -122,7 +123,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         if left > EFFECT or left > 0.1 * before:
             continue
         if of_wo:
-            words = f"samples over pdf are {formula} times a number of wo, within {max(left, 1e-3):.0e}"
+            words = f"{OVER} {formula} times a factor that depends only on wo, within {max(left, 1e-3):.0e}"
             return Cause(f"{words}: {guess}?", f"samples {guess}")
         text = written(scale, KNOWN)
         text = text if text in NUMBERS else f"{scale:.3g}"
@@ -137,7 +138,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         result = formula if plain else text if formula == "1" else f"{text} times {formula}"
         if text.startswith("1 / ") and formula.startswith("1 / "):
             result = f"1 / ({text[4:]} {formula[4:]})"
-        agree = f"samples over pdf are {result}, within {max(left, 1e-3):.0e} in the cells and in int pdf for all wo"
+        agree = f"{OVER} {result}, within {max(left, 1e-3):.0e}, both in the cells and in int pdf for all wo"
         return Cause(f"{agree}: {guess}?", f"samples {result}")
     return _sides(held)
 
@@ -145,15 +146,15 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 def _number_of_wo(subject: Subject, held: Blocks, scale: float) -> Cause:
     """The probable cause if samples follow the distribution of the pdf, but their number differs from the expectation
     by a factor that depends on wo."""
-    agree = f"samples over pdf are {scale:.3g} for all wi, and another number for other wo"
+    agree = f"{OVER} {scale:.3g} for all wi, but differs for other wo"
     u = directions.numbers(np.random.default_rng(46), DRAWN)
     s = subject.sample(np.broadcast_to(held.wo, (DRAWN, 3)), u)
     failed, lacking = float(np.mean(~(s.pdf > 0.0))), 1.0 - float(held.expected.sum()) / held.drawn
     if failed > max(lacking, 0.0) + LOST and not s.delta.any():
-        share = f"{failed:.0%} of the samples fail, where the pdf lacks {max(lacking, 0.0):.0%}"
-        guess = "normals that wo does not see are drawn, or directions below the horizon"
+        share = f"{failed:.0%} of the samples fail, but int pdf is only {max(lacking, 0.0):.0%} below 1"
+        guess = "are normals that face away from wo sampled, or directions below the horizon"
         return Cause(f"{agree}: {share}: {guess}?", "samples that fail")
-    return Cause(f"{agree}: the probability of choosing a lobe?", "samples a number of wo")
+    return Cause(f"{agree}: a wrong probability of choosing a lobe?", "samples a number of wo")
 
 
 def _normalizes(subject: Subject, light: estimators.Estimates, field: Field, scale: float) -> bool:
@@ -183,8 +184,8 @@ def _sides(held: Blocks) -> Cause | None:
     if effect(scaled, held.observed) > EFFECT or abs(np.log(shares[0] / shares[1])) < BEFORE:
         return None
     above, below = shares
-    agree = f"samples over pdf are {above:.3g} above the surface and {below:.3g} below it, the same within each side"
-    return Cause(f"{agree}: the choice between reflection and transmission?", "samples choose the side")
+    agree = f"{OVER} {above:.3g} above the surface and {below:.3g} below it, for all wi on each side"
+    return Cause(f"{agree}: a wrong probability of reflection?", "samples choose the side")
 
 
 def effect(expected: np.ndarray, observed: np.ndarray) -> float:
@@ -208,8 +209,8 @@ def _factors(subject: Subject) -> Iterator[Factor]:
         return np.divide(value(o, i), pdf, out=np.zeros(len(o)), where=pdf > 0.0)
 
     densities: list[tuple[str, str, Callable[[np.ndarray, np.ndarray], Any]]] = [
-        ("1 / pdf", "samples are uniform, and the pdf is not", lambda o, i: 1.0),
-        ("cos_i / pdf", "samples follow the cosine, and the pdf does not", lambda o, i: np.abs(i[:, 2])),
+        ("1 / pdf", "samples are uniform, but the pdf is not", lambda o, i: 1.0),
+        ("cos_i / pdf", "samples are proportional to the cosine, but the pdf is not", lambda o, i: np.abs(i[:, 2])),
     ]
     yield Factor("1", "a constant of the pdf, or the probability of choosing a lobe", lambda o, i: np.ones(len(o)))
     for formula, guess, value in densities:
@@ -218,7 +219,7 @@ def _factors(subject: Subject) -> Iterator[Factor]:
         yield from factors.cosines(("(o.m)", "cos_m", "cos_i", "sin_i"))
     yield from factors.indices(subject, (2, -2, 4, -4), "eta^2 of the Jacobian of refraction", [*factors.SIDES])
     for text, guess, other in factors.widths(subject):
-        yield Factor(f"those of {text}", guess, functools.partial(over_pdf, value=other.pdf))
+        yield Factor(f"(pdf with {text}) / pdf", guess, functools.partial(over_pdf, value=other.pdf))
     if not subject.transmits:
         yield from factors.distributions(subject)
     yield from factors.normals(subject)
@@ -233,4 +234,4 @@ def unsampled(subject: Subject) -> str:
     if excess[row] < 1e-3:
         return ""
     share = severity.percent(float(excess[row]))
-    return f"the pdf claims {share} of samples that never occur, wo at {theta:.3g} degrees"
+    return f"int pdf exceeds the fraction of valid samples by {share}, wo at {severity.degrees(theta)}"

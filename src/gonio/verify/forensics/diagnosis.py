@@ -94,7 +94,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
         elif cause is not None:
             # rounding that is invisible in pictures does not explain visible failures
             aside = law.name == "precision" and verdict.grade in (None, Grade.INVISIBLE) and visible
-            verdict.cause = f"apart from the others: {cause.words}" if aside else cause.words
+            verdict.cause = f"unrelated to the other failures: {cause.words}" if aside else cause.words
             named[cause.key] = law.name
 
 
@@ -110,7 +110,7 @@ _ERRORS = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexEr
 
 
 UNSTEADY = Cause(
-    "repeated, or among other rays, a call has another result: state, random values, or a sum over all rays?",
+    "results change if a call is repeated or if other rays are added: state, random values, or a sum over all rays?",
     "unsteady",
 )
 
@@ -157,5 +157,5 @@ def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verd
         return None
     return (
         Grade.INNER,
-        f"{' and '.join(dict.fromkeys(wrong))} fails this law by itself; with a correct one inside, the law holds",
+        f"{' and '.join(dict.fromkeys(wrong))} fails this law by itself; with a correct inner material, the law holds",
     )

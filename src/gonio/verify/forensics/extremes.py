@@ -42,9 +42,9 @@ def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fai
         return ""
     zero = all(np.all(np.asarray(settings[part.split(" = ")[0]], float) == 0.0) for part in needed)
     guess = {
-        (True, "not finite"): "a division by it, or a logarithm of it",
-        (False, "not finite"): "an overflow, or a division by 0",
-        (True, "negative"): "a term that is subtracted and not clamped",
+        (True, "not finite"): "a division by it, or its logarithm",
+        (False, "not finite"): "an overflow or a division by 0",
+        (True, "negative"): "a subtracted term that is not clamped",
         (False, "negative"): "a term that exceeds its range and is not clamped",
     }[zero, fault]
     return f"only for {' and '.join(needed)}: {guess}?"
@@ -59,10 +59,10 @@ def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cau
             for corner in corners:
                 there = u[:, dimension] == corner
                 if not np.any(bad & ~there) and np.sum(bad & there) > OFTEN * there.sum():
-                    value = "0" if corner == 0.0 else "next to 1" if corner > 0.9 else f"{corner:g}"
+                    value = "0" if corner == 0.0 else "just below 1" if corner > 0.9 else f"{corner:g}"
                     other = "1 - " if corner > 0.9 else ""
                     words = f"{what} is {fault} only where the {name} random number is {value}"
-                    return Cause(f"{words}: a logarithm of {other}u, or a division by it?", f"{fault} at u")
+                    return Cause(f"{words}: a logarithm of {other}u, or a division by {other}u?", f"{fault} at u")
     return None
 
 
@@ -87,8 +87,8 @@ def of_views(what: str, wo: np.ndarray, bad: np.ndarray, fault: str, transmits: 
     words = f"{what} is {fault} only for wo {name} the surface"
     if first < STEEP:
         return Cause(words, f"{fault} {name}")
-    guess = ": total reflection?" if transmits else ""
-    return Cause(f"{words}, from {first:.3g} degrees to the normal on{guess}", f"{fault} {name}")
+    guess = ": total internal reflection?" if transmits else ""
+    return Cause(f"{words}, at {first:.3g} degrees from the normal or more{guess}", f"{fault} {name}")
 
 
 def _written(value: Any) -> str:

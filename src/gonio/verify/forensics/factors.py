@@ -45,10 +45,12 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 COSINES = {
-    "(o.m)": Cosine("the Jacobian of the half vector, 4 (o.m), missing or doubled", lambda o, i, m: _dot(o, m)),
-    "cos_m": Cosine("the cosine of the half vector, m.z, missing or doubled in its density", lambda o, i, m: m[:, 2]),
-    "cos_i": Cosine("the cosine of wi, missing or doubled", lambda o, i, m: i[:, 2]),
-    "cos_o": Cosine("the cosine of wo, missing or doubled", lambda o, i, m: o[:, 2]),
+    "(o.m)": Cosine("the Jacobian of the half vector, 4 (o.m), missing or applied twice", lambda o, i, m: _dot(o, m)),
+    "cos_m": Cosine(
+        "the cosine of the half vector, m.z, missing from its density or applied twice", lambda o, i, m: m[:, 2]
+    ),
+    "cos_i": Cosine("the cosine of wi, missing or applied twice", lambda o, i, m: i[:, 2]),
+    "cos_o": Cosine("the cosine of wo, missing or applied twice", lambda o, i, m: o[:, 2]),
     "sin_i": Cosine("the sine of wi, the Jacobian of spherical angles", lambda o, i, m: np.hypot(i[:, 0], i[:, 1])),
     "sin_o": Cosine("the sine of wo", lambda o, i, m: np.hypot(o[:, 0], o[:, 1])),
     "(i.m)": Cosine("the Jacobian of refraction", lambda o, i, m: _dot(i, m)),
@@ -162,7 +164,7 @@ def normals(subject: Subject) -> Iterator[Factor]:
                 return np.asarray((above / below) ** power)
 
             formula = product("", {"(o.m)": int(power), "cos_m": -int(power)})
-            guess = f"samples have the density of {drawn}, and the pdf is that of {stated}"
+            guess = f"samples are drawn from {drawn}, but the pdf is that of {stated}"
             yield Factor(formula, guess, field, of_wo=True)
 
 
@@ -184,14 +186,14 @@ def refractions(subject: Subject) -> Iterator[Factor]:
                     return np.asarray(np.prod(values ** np.array([*p.values()], float), axis=1) * side ** float(over))
 
                 facet = over or any("m" in name for name in powers)
-                guess = COSINES["(i.m)"].guess if facet else "the cosine of wi in place of that of wo, or the reverse"
+                guess = COSINES["(i.m)"].guess if facet else "the cosine of wi in place of that of wo, or vice versa"
                 yield Factor(product("", powers | ({"eta": over} if over else {})), guess, field)
 
 
 # --------------------------------------------------------------------------- widths
 
 POWERS = {"alpha^2": 2.0, "sqrt(alpha)": 0.5}
-WIDTH = "alpha in place of alpha^2, or the reverse"
+WIDTH = "alpha in place of alpha^2, or vice versa"
 
 
 def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
@@ -259,7 +261,7 @@ def _beckmann(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
 
 # --------------------------------------------------------------------------- Fresnel's term
 
-AT_NORMAL = "Fresnel's term at the normal in place of the half vector"
+AT_NORMAL = "the Fresnel term at the angle to the normal instead of the half vector"
 
 
 def dielectrics(subject: Subject, antisymmetric: bool) -> Iterator[Factor]:
@@ -280,8 +282,8 @@ def dielectrics(subject: Subject, antisymmetric: bool) -> Iterator[Factor]:
             return np.asarray(share(o[:, 2], side) / other)
 
         formula = "F(n.o) / F(n.i)" if antisymmetric else "F(n.o) / F(o.m)"
-        yield Factor(f"{formula} of index {eta:.4g}", AT_NORMAL, field)
-        yield Factor(f"1 / ({formula}) of index {eta:.4g}", AT_NORMAL, functools.partial(_inverse, field))
+        yield Factor(f"{formula} for index {eta:.4g}", AT_NORMAL, field)
+        yield Factor(f"1 / ({formula}) for index {eta:.4g}", AT_NORMAL, functools.partial(_inverse, field))
 
 
 def _inverse(field: Field, o: np.ndarray, i: np.ndarray) -> np.ndarray:

@@ -59,13 +59,13 @@ def _constant(ratio: Ratio) -> Fit | None:
     if quality is None or abs(middle - 1.0) < max(SPREAD, 2.0 * tolerance(ratio)):
         return None
     if abs(middle + 1.0) < SPREAD:
-        return Fit("-1", "a sign", *quality)
+        return Fit("-1", "a wrong sign", *quality)
     for name, number in ratio.numbers.items():
         if abs(middle / number - 1.0) < SPREAD:
             return Fit(f"{name} = {middle:.5g}", "the chain rule, omitted or applied twice", *quality)
     text = written(middle) if middle > 0.0 else f"-{written(-middle)}"
     known = text.lstrip("-") in NUMBERS
-    guess = "a constant that one of the two lacks" if known else ANY
+    guess = "a constant that is missing from one of the two" if known else ANY
     return Fit(text, guess, *quality, middle)
 
 
@@ -82,7 +82,7 @@ def _color(ratio: Ratio) -> Fit | None:
     if len(spreads) < 3:
         return None
     text = ", ".join(f"{m:.4g}" for m in middle)
-    guess = "a color that one of the two lacks"
+    guess = "a color that is missing from one of the two"
     return Fit(f"({text})", guess, max(s for s, _ in spreads), min(c for _, c in spreads))
 
 
@@ -149,7 +149,7 @@ def _of_table(ratio: Ratio, table: Iterator[factors.Factor]) -> Fit | None:
 def _index(ratio: Ratio) -> Fit | None:
     if not np.any(ratio.wo[:, 2] * ratio.wi[:, 2] < 0.0):
         return None
-    guess = "the factor (eta_o / eta_i)^2 of radiance, missing, doubled or inverted"
+    guess = "the factor (eta_o / eta_i)^2 of radiance, missing, applied twice or inverted"
     return _of_table(ratio, factors.indices(ratio.subject, (2, -2, 1, -1, 4, -4, 3, -3), guess))
 
 
@@ -178,11 +178,11 @@ def _otherwise(ratio: Ratio) -> Fit | None:
         ways.append(("with wo and wi exchanged", "swapped arguments", (subject, wi, wo, "radiance")))
         flips = {"wi.x": (-1.0, 1.0, 1.0), "wi.y": (1.0, -1.0, 1.0), "wi.x and wi.y": (-1.0, -1.0, 1.0)}
         for text, flip in flips.items():
-            guess = "a sign of a tangent, or a direction that points the other way"
+            guess = "a wrong sign of a tangent, or a reversed direction"
             ways.append((f"with the sign of {text} flipped", guess, (subject, wo, wi * np.array(flip), "radiance")))
     if subject.transmits:
         for mode in ("radiance", "importance"):
-            ways.append((f"in mode {mode}", "`mode` is ignored, or inverted", (subject, wo, wi, mode)))
+            ways.append((f"in mode {mode}", "`mode` is ignored or inverted", (subject, wo, wi, mode)))
     for text, guess, other in factors.widths(subject):
         ways.append((f"with {text}", guess, (other, wo, wi, "radiance")))
     for words, guess, arguments in ways:
@@ -215,7 +215,7 @@ def _schlick(ratio: Ratio) -> Fit | None:
     cases: list[tuple[str, str, np.ndarray, np.ndarray]] = []
     if not ratio.antisymmetric:
         # F with (1 - cos)^5 = 1 is 1: a term that one of the two lacks
-        one, guess = np.ones(len(r)), "Fresnel's term, missing in one of the two or doubled"
+        one, guess = np.ones(len(r)), "the Fresnel term, missing from one of the two or applied twice"
         for name, x in powers.items():
             cases += [(f"F({name})", guess, x, one), (f"1 / F({name})", guess, one, x)]
     order = [("n.o", "n.i"), ("n.i", "n.o")] if ratio.antisymmetric else itertools.permutations(powers, 2)
@@ -271,8 +271,8 @@ def _one_direction(ratio: Ratio) -> Fit | None:
             break
     if quality is None:
         return None
-    guess = "a term of one direction only, in place of the half vector or of both directions"
-    return Fit("g(wo) / g(wi), with g of one cosine", guess, *quality)
+    guess = "a term that depends on one direction only, instead of the half vector or both directions"
+    return Fit("g(wo) / g(wi), where g is a function of one cosine", guess, *quality)
 
 
 CANDIDATES: tuple[Callable[[Ratio], Fit | None], ...] = (

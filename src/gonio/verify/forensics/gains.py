@@ -80,11 +80,10 @@ def _parts(white: Subject, albedo: Albedo, here: float) -> str:
     wrong = [path for path, value in by_part.items() if value > 1.0 + GAIN]
     text = ", ".join(f"{value:.4g} with {path} alone" for path, value in by_part.items())
     if not wrong:
-        return (
-            f"the parts reflect {text}, and {here:.4g} together: one of them is not reduced by what the other reflects?"
-        )
+        words = f"the albedo is {text}, but {here:.4g} for all together"
+        return f"{words}: is one lobe not reduced by what the other reflects?"
     if len(wrong) < len(colors):
-        return f"the largest albedo is {text}: the normalization of the part with {' and '.join(wrong)}?"
+        return f"the largest albedo is {text}: a wrong normalization of the lobe with {' and '.join(wrong)}?"
     return ""
 
 
@@ -159,16 +158,16 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | No
         if gains.any() and not gains.all() and here.max() - largest.min() > 0.5 * (here.max() - 1.0):
             least = float(x[np.argmin(largest)])
             none = float(np.exp(least)) if np.isfinite(least) else low
-            words = f"the largest albedo without absorption is {largest.min():.4g} at {name} = {none:.3g} and "
+            words = f"without absorption, the largest albedo is {largest.min():.4g} at {name} = {none:.3g} and "
             words += f"{largest.max():.4g} at {float(np.exp(x[np.argmax(largest)])):.3g}"
-            guess = f"a term with {name} that is too large there: a normalization, a masking or a compensation"
+            guess = f"a term that depends on {name} and is too large there: normalization, masking or compensation"
             ends.append(Cause(f"{words}: {guess}?", f"gain by {name}"))
     if powers:
         formula = " ".join(name if power == 1.0 else f"{name}^{power:g}" for name, power in powers.items())
         constant = float(here[0].mean()) / scale
         times = "" if abs(constant - 1.0) < 2.0 * RESIDUAL else f"{written(constant, RESIDUAL)} "
-        words = f"without absorption it reflects {times}{formula} at the normal"
-        guess = "these powers, missing in the normalization or there too often"
+        words = f"without absorption, the albedo at normal incidence is {times}{formula}"
+        guess = "powers that are missing from the normalization or applied twice"
         return Cause(f"{words}: {guess}?", f"gain {formula}"), None
     return None, ends[0] if ends else None
 
@@ -183,9 +182,9 @@ def _views(here: np.ndarray) -> Cause | None:
         return None
     mu = np.cos(np.radians(VIEWS))
     slope, start = np.polyfit(np.log(mu), np.log(np.maximum(a, 1e-9)), 1)
-    guess = "the masking, a normalization that holds at the normal only, or a factor that is missing at grazing views"
+    guess = "wrong masking, a normalization that holds only at normal incidence, or a missing factor at grazing angles"
     row = int(np.argmax(a))
-    words = f"without absorption it reflects {a[0]:.4g} at the normal and {a[row]:.4g} at {VIEWS[row]:g} degrees"
+    words = f"without absorption, the albedo is {a[0]:.4g} at the normal and {a[row]:.4g} at {VIEWS[row]:g} degrees"
     if abs(slope) > 0.05 and np.abs(np.log(a) - (slope * np.log(mu) + start)).max() < 3.0 * RESIDUAL:
         words += f", like cos_o^{slope:.2g}"
     return Cause(f"{words}: {guess}?", "gain at grazing views")
@@ -214,8 +213,10 @@ def of_lobes(subject: Subject, seed: int) -> Iterator[Cause]:
     row = int(np.argmax((R + T).max(1)))
     words = f"delta lobes reflect {R[row].max():.4g} and transmit {T[row].max():.4g} at {VIEWS[1 + row]:g} degrees"
     if np.ptp(R, axis=1).max() > EXACT and near(1.0 - R.mean(1, keepdims=True)):
-        yield Cause(f"{words}: transmission is 1 - the mean of the reflectance over the channels?", "T of mean R")
+        yield Cause(f"{words}: is the transmittance 1 - the mean reflectance of the channels?", "T of mean R")
     elif near(1.0 - R / np.maximum(2.0 - R, 1e-6)):
-        yield Cause(f"{words}: reflection is that of both faces of a pane, and transmission that of one?", "T of one")
+        yield Cause(
+            f"{words}: is the reflectance that of both faces of a pane, but the transmittance that of one?", "T of one"
+        )
     elif T.min() > EXACT:
-        yield Cause(f"{words}: transmission is not what reflection leaves?", "T not reduced by R")
+        yield Cause(f"{words}: is the transmittance not reduced by the reflectance?", "T not reduced by R")

@@ -37,7 +37,9 @@ def causes(white: Subject, loss: Callable[[Subject], float], claim: float) -> It
         none = [one <= small for one in lost]
         text = " and ".join(f"{one:.4f} at {path} = {end:g}" for one, end in zip(lost, ends, strict=True))
         if all(none):
-            words = f"the loss is {here:.4f} at {path} = {value:g}, and {text}: parameters mixed in place of two lobes?"
+            words = (
+                f"the loss is {here:.4f} at {path} = {value:g}, and {text}: are parameters mixed instead of two lobes?"
+            )
             yield Cause(words, f"mixed {path}")
         elif any(none):
             yield Cause(f"the loss depends on {path}: {text}", f"loss by {path}")

@@ -49,7 +49,7 @@ def mismatch(subject: Subject) -> str:
     theta = directions.angles(wo[row])[0]
     return (
         f"the masking does not match the distribution: 1 + Lambda is {stated[row]:.4g} at {theta:.3g} degrees, where "
-        f"the facets of D that are seen from there have {area[row]:.4g} times the projected area"
+        f"the facets of D that face this direction have {area[row]:.4g} times the projected area"
     )
 
 

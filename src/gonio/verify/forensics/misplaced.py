@@ -57,20 +57,20 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 def _frames(subject: Subject) -> Iterator[tuple[str, str, np.ndarray]]:
     """Rotations about the normal and mirror images: for each, its description, the mistake that it suggests, and its
     matrix."""
-    guess = "the rotation of the axes is left out in one of the two, or turns the wrong way"
+    guess = "the rotation of the axes is missing from one of the two, or has the wrong sign"
     for path, angle in _angles(subject):
         for factor in (1.0, -1.0, 2.0, -2.0):
             words = f"{'-' if factor < 0.0 else ''}{'2 ' if abs(factor) > 1.5 else ''}{path}"
             yield f"of wi rotated by {words}", guess, _rotation(factor * angle)
     yield (
         "of wi rotated by 180 degrees about the normal",
-        "a direction that points the other way",
+        "a reversed direction",
         np.diag([-1, -1, 1.0]),
     )
     for k, axis in enumerate("xy"):
         signs = np.ones(3)
         signs[k] = -1.0
-        yield f"with the sign of wi.{axis} flipped", "a sign of a tangent", np.diag(signs)
+        yield f"with the sign of wi.{axis} flipped", "a wrong sign of a tangent", np.diag(signs)
     exchanged = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     yield "with wi.x and wi.y exchanged", "sine and cosine of the azimuth, or x and y, exchanged", exchanged
     for sign in (1.0, -1.0):
@@ -95,14 +95,14 @@ def _other_frame(subject: Subject, held: Blocks, before: float) -> Cause | None:
     wo = np.broadcast_to(held.wo, held.wi.shape)
     swapped = held.joined(np.nan_to_num(subject.pdf(held.wi, wo), posinf=0.0, neginf=0.0) * held.area) * held.drawn
     if (left := effect(swapped, held.observed)) < 3.0 * EFFECT and left < 0.3 * before:
-        words = "samples are distributed as the pdf with wo and wi exchanged: swapped arguments?"
+        words = "samples follow the pdf with wo and wi exchanged: swapped arguments?"
         return Cause(words, "samples of swapped directions")
     for text, guess, matrix in _frames(subject):
-        for which, view in (("", wo), (", and wo too", wo @ matrix.T)):
+        for which, view in (("", wo), (", and the same for wo", wo @ matrix.T)):
             density = np.nan_to_num(subject.pdf(view, held.wi @ matrix.T), posinf=0.0, neginf=0.0)
             left = effect(held.joined(density * held.area) * held.drawn, held.observed)
             if left < 3.0 * EFFECT and left < 0.3 * before:
-                words = f"samples are distributed as the pdf {text}{which}"
+                words = f"samples follow the pdf {text}{which}"
                 return Cause(f"{words}: {guess}?", "samples in another frame")
     return None
 
@@ -152,14 +152,16 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
     scale = "" if abs(c - 1.0) < 2.0 * STEP else f" times {c:.3g}"
     if lacking:
         if place.startswith("within") and "horizon" in place:
-            guess = "directions from below the horizon that are mirrored up or clamped, or a lobe that the pdf lacks"
+            guess = "directions below the horizon that are mirrored or clamped, or a lobe that is missing from the pdf"
         elif ring:
-            guess = "an angle that is clamped, or drawn evenly where its cosine is due, or a lobe that the pdf lacks"
+            guess = "an angle that is clamped, or uniform instead of its cosine, or a lobe that is missing from the pdf"
         else:
-            guess = "a lobe that the pdf lacks"
-        return Cause(f"samples follow the pdf{scale}, but for {share} of them, {place}: {guess}?", "pdf lacks a lobe")
-    words = f"samples follow the pdf{scale}, but {share} of it, {place}, is hardly sampled"
-    return Cause(f"{words}: a part of the pdf that `sample` does not draw?", "sample lacks a lobe")
+            guess = "a lobe that is missing from the pdf"
+        return Cause(
+            f"samples follow the pdf{scale}, except for {share} of them, {place}: {guess}?", "pdf lacks a lobe"
+        )
+    words = f"samples follow the pdf{scale}, but {share} of it, {place}, is rarely sampled"
+    return Cause(f"{words}: a lobe that `sample` does not choose?", "sample lacks a lobe")
 
 
 def _place(held: Blocks, weight: np.ndarray) -> tuple[str, bool]:
@@ -185,7 +187,7 @@ def _place(held: Blocks, weight: np.ndarray) -> tuple[str, bool]:
     if length > 0.8:
         theta = np.degrees(np.arccos(np.clip(direction[2] / length, -1.0, 1.0)))
         phi = np.degrees(np.arctan2(direction[1], direction[0])) % 360.0
-        return f"near wi {theta:.3g}, {phi:.3g} degrees", small
+        return f"near wi at {theta:.3g}, {phi:.3g} degrees", small
     return "", small
 
 
@@ -199,23 +201,23 @@ def _mirrored(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
 Variable = Callable[[np.ndarray, np.ndarray], np.ndarray]
 VARIABLES: dict[str, tuple[str, Variable]] = {
     "wi's angle to the normal": (
-        "the polar angle is drawn from another distribution than that of the pdf, or a Jacobian is wrong",
+        "the distribution of the polar angle differs from that of the pdf, or a Jacobian is wrong",
         lambda o, i: i[:, 2],
     ),
     "the half vector's angle to the normal": (
-        "the half vector is drawn from another distribution than that of the pdf",
+        "the distribution of the half vector differs from that of the pdf",
         lambda o, i: half_vector(o, i)[:, 2],
     ),
     "the angle to the mirror direction": (
-        "the lobe about the mirror direction is drawn from another distribution than that of the pdf",
+        "the distribution of the lobe about the mirror direction differs from that of the pdf",
         _mirrored,
     ),
     "wi's azimuth": (
-        "the azimuth is drawn from another distribution than that of the pdf",
+        "the distribution of the azimuth differs from that of the pdf",
         lambda o, i: np.arctan2(i[:, 1], i[:, 0]),
     ),
     "the half vector's azimuth": (
-        "the half vector's azimuth is drawn from another distribution than that of the pdf",
+        "the distribution of the half vector's azimuth differs from that of the pdf",
         lambda o, i: np.arctan2(half_vector(o, i)[:, 1], half_vector(o, i)[:, 0]),
     ),
 }
@@ -238,5 +240,5 @@ def _one_variable(cells: SampleCells, held: Blocks, before: float) -> Cause | No
     if best is None:
         return None
     _, name, guess, ratio = best
-    words = f"samples over pdf depend on {name} alone, {ratio.min():.2g} to {ratio.max():.2g}"
+    words = f"the ratio of samples to pdf depends on {name} alone, from {ratio.min():.2g} to {ratio.max():.2g}"
     return Cause(f"{words}: {guess}?", f"samples by {name}")

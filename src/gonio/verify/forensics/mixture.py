@@ -65,8 +65,8 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         return None
     mean = held.joined(other * held.expected) / np.maximum(held.joined(held.expected), 1e-30)
     if _effect(mean * lobes[0] + (1.0 - mean) * lobes[1], expected) < 2.0 * EFFECT:
-        words = "the pdf weighs two lobes by the share that the samples have for wo = wi"
-        guess = "the probability of the choice is taken at wi in the pdf, at wo in sample"
+        words = "the pdf weights the two lobes by the probability that the samples have for wo = wi"
+        guess = "the probability of a lobe is evaluated at wi in the pdf, but at wo in sample"
         return Cause(f"{words}: {guess}?", "share of wi")
     return None
 
@@ -74,11 +74,11 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
 def _of_weights(weights: np.ndarray, shares: np.ndarray) -> Cause | None:
     """The mistake that the weights of the lobes in the pdf suggest, given the lobes' fractions of the samples."""
     given, chosen = (", ".join(f"{w:.3g}" for w in part) for part in (weights, shares))
-    words = f"the pdf weighs the lobes {given}, the samples choose them {chosen}"
+    words = f"the pdf weights the lobes by {given}, but they are sampled with probabilities {chosen}"
     if np.abs(weights[::-1] - shares).max() < SHARE:
-        guess = "the weights are exchanged"
+        guess = "exchanged weights"
     elif abs(weights.sum() - 1.0) < SHARE:
-        guess = "the probability of the choice is another one in the pdf"
+        guess = "different probabilities in pdf and sample"
     else:
         ratios = weights / shares
         wrong = np.flatnonzero(np.abs(weights - shares) > 0.5 * SHARE)
@@ -88,9 +88,7 @@ def _of_weights(weights: np.ndarray, shares: np.ndarray) -> Cause | None:
         words += (
             f": the density of lobe {number} is {written(float(ratios[wrong[0]]), 0.004)} times that of its samples"
         )
-        return Cause(
-            f"{words}: its normalization, or its share of the choice, left out or squared?", "weights of lobes"
-        )
+        return Cause(f"{words}: is its normalization or its probability missing, or squared?", "weights of lobes")
     return Cause(f"{words}: {guess}?", "weights of lobes")
 
 

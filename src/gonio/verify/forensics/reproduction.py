@@ -143,7 +143,7 @@ def _pdf(subject: Subject, finding: Finding) -> str:
         f"claimed = dr.sum(dr.select({inside.format('wo')}, bsdf.pdf(ctx, si, wo) * area, 0))\n"
         f"drawn = dr.mean(dr.select(dr.any(weight > 0) & ({inside.format('bs.wo')}), 1.0, 0.0))\n"
         f"assert dr.abs(claimed - drawn) < {0.5 * abs(off):.2g}, "
-        'f"the pdf claims {claimed} of all samples, and {drawn} occur"\n'
+        'f"the pdf integrates to {claimed}, but the fraction of samples is {drawn}"\n'
     )
 
 
@@ -169,7 +169,7 @@ def _reciprocity(subject: Subject, finding: Finding) -> str:
         "si.wi, wo = wo, mi.Vector3f(si.wi)\n"
         "back = bsdf.eval(ctx, si, wo) / dr.abs(wo.z)\n"
         f"assert dr.all(dr.abs(there - back) <= {0.5 * min(finding.figure, 1.0):.2g} * dr.maximum(there, back)), "
-        'f"{there} one way, {back} the other"\n'
+        'f"{there} in one direction, {back} in the other"\n'
     )
 
 
@@ -180,7 +180,7 @@ def _positivity(subject: Subject, finding: Finding) -> str:
     return _head(subject, wo) + (
         f"wo = {_vector(wi)}\n" + SAMPLE + "values = [bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf]\n"
         "good = [dr.all(dr.isfinite(v) & (v >= 0), axis=None) for v in values]\n"
-        'assert dr.all(good, axis=None), f"finite and not negative: eval, pdf, weight, pdf of the sample: {good}"\n'
+        'assert dr.all(good, axis=None), f"valid values of eval, pdf, weight, pdf of the sample: {good}"\n'
     )
 
 
@@ -215,7 +215,7 @@ def _linearity(subject: Subject, finding: Finding) -> str:
         "    values.append(mi.load_dict(plugin).eval(ctx, si, wo))\n"
         "between = 0.75 * values[0] + 0.25 * values[2]\n"
         f"assert dr.all(dr.abs(values[1] - between) <= {0.5 * finding.figure:.2g} * between), "
-        f'f"{{values[1]}} where {name} is between two others, which give {{between}}"\n'
+        f'f"{{values[1]}} instead of {{between}}, with {name} between two other values"\n'
     )
 
 
@@ -238,7 +238,7 @@ CALLS = {
     'assert dr.count(wrong) < 0.01 * n, f"eval_pdf is not eval and pdf for {dr.count(wrong)} of {n} pairs"\n',
     "flags": SAMPLE + "last = dr.max(dr.select(dr.any(weight > 0), bs.sampled_component, 0))\n"
     "count, kinds = bsdf.component_count(), [bsdf.flags(k) for k in range(bsdf.component_count())]\n"
-    'assert dr.all(last < count), f"samples of component {last}, of {count}: {kinds}"\n',
+    'assert dr.all(last < count), f"sampled_component is {last}, but there are {count} components: {kinds}"\n',
     "components": "wo = mi.warp.square_to_uniform_sphere(mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
     "total, parts, sampled = bsdf.eval(ctx, si, wo), mi.Color3f(0), {}\n"
     "for ctx.component in range(bsdf.component_count()):\n"
@@ -247,17 +247,17 @@ CALLS = {
     "    sampled[ctx.component] = (dr.min(got)[0], dr.max(got)[0])\n"
     "parts, total = dr.mean(parts, axis=None), dr.mean(total, axis=None)\n"
     "assert all(pair == (k, k) for k, pair in sampled.items()) and dr.allclose(parts, total, 1e-3), "
-    'f"with one component enabled, samples are of {sampled}; values sum to {parts}, eval is {total}"\n',
+    'f"with one component enabled, samples are of {sampled}; values sum to {parts}, but eval is {total}"\n',
     "types": "wo = mi.warp.square_to_uniform_sphere(mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
     "total, parts = bsdf.eval(ctx, si, wo), mi.Color3f(0)\n"
     "for kind in (mi.BSDFFlags.Reflection, mi.BSDFFlags.Transmission):\n"
     "    ctx.type_mask = int(kind)\n"
     "    parts += bsdf.eval(ctx, si, wo)\n"
     "parts, total = dr.mean(parts, axis=None), dr.mean(total, axis=None)\n"
-    'assert dr.allclose(parts, total, 1e-3), f"reflected and transmitted sum to {parts}, eval is {total}"\n',
+    'assert dr.allclose(parts, total, 1e-3), f"reflection and transmission sum to {parts}, but eval is {total}"\n',
     "eval_diffuse_reflectance": "value = bsdf.eval_diffuse_reflectance(si)\n"
     "least, most = dr.min(value, axis=None), dr.max(value, axis=None)\n"
-    'assert 0 <= least and most <= 1, f"a reflectance is from {least} to {most}"\n',
+    'assert 0 <= least and most <= 1, f"the reflectance ranges from {least} to {most}"\n',
 }
 
 MAKERS: dict[str, Callable[[Subject, Finding], str]] = {

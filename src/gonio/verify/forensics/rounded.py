@@ -44,6 +44,6 @@ def named(subject: Subject) -> Cause | None:
             continue
         step = float(-np.mean(distances))
         if np.std(distances) < EQUAL * step:
-            words = f"values change in equal steps of {name}, {step:.2g}"
+            words = f"values change only in steps of {step:.2g} of {name}"
             return Cause(f"{words}: is it rounded to {np.log2(1.0 / step):.0f} bits, as in half precision?", "rounded")
     return None

@@ -167,13 +167,13 @@ class _State:
             self.forbidden[method, key] = f"{reason} (in {method}{', at ' if values else ''}{values})"
             reasons = [text for (name, _), text in self.forbidden.items() if name == method]
             if len(reasons) >= STRIKES:
-                others = f"not called at these values, because {reasons[0]}, and at others"
+                others = f"not called at these values, because {reasons[0]}; likewise at other values"
                 self.forbidden.setdefault((method, OTHERS), others)
             return
         self.strikes += step == BETWEEN
         if step in self.skip or self.strikes >= STRIKES:
             if all(law in self.skip for law in laws):
-                raise MachineError(f"the process that judges crashes at every step: {reason}", self.title)
+                raise MachineError(f"the test process crashes at every step: {reason}", self.title)
             self.skip = dict.fromkeys(laws, reason) | self.skip
         elif step != BETWEEN:
             self.skip[step] = reason
@@ -278,7 +278,7 @@ class _Pool:
         worker.busy = False
         printed = worker.lines()
         if printed:
-            card.notes.append(f"it printed {printed} {'line' if printed == 1 else 'lines'} while it was judged")
+            card.notes.append(f"it printed {printed} {'line' if printed == 1 else 'lines'} during the tests")
         card.notes += self.states[number].notes
         self.states[number].card = card
         if len(self.states) > 1:
@@ -302,10 +302,10 @@ class _Pool:
         self.workers.remove(worker)
         words = f"{reason}; the last line that it printed: {last}" if last else reason
         if worker.step == STARTING:
-            raise MachineError(f"the process that judges did not start: {words}", "", "see `gonio doctor`")
+            raise MachineError(f"the test process did not start: {words}", "", "see `gonio doctor`")
         if worker.step == LOADING or self.states is None:
             names = ", ".join(item.target for item in self.task.items if isinstance(item.target, str))
-            raise InputError(f"{LOADING}: {words}", names, "a BSDF must load before it can be judged")
+            raise InputError(f"{LOADING}: {words}", names, "a BSDF must load before it can be tested")
         if worker.busy:
             one = self.states[worker.card]
             if last:

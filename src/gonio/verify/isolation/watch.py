@@ -23,7 +23,7 @@ calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = 
 
 def words(seconds: float) -> str:
     """The message for a law that did not end within a number of seconds."""
-    return f"not finished after {seconds:g} s: does `sample` loop on a condition that may never hold?"
+    return f"not finished after {seconds:g} s: does `sample` loop until a condition that may never hold?"
 
 
 @contextlib.contextmanager

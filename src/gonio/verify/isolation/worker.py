@@ -51,7 +51,7 @@ def main() -> None:
         say("lost", str(error))
     except (KeyboardInterrupt, SystemExit, GeneratorExit, TimeoutError, MemoryError, RecursionError) as error:
         # Ctrl-C does not reach this process: the BSDF raised it, outside the calls that `guarded` watches
-        say("lost", f"{type(error).__name__} ended the thread that judges it")
+        say("lost", f"{type(error).__name__} ended the thread that tests it")
     except BaseException as error:
         place, what = _outside(error), f"{type(error).__name__}: {error}"
         if place:

@@ -33,10 +33,10 @@ class Calls(Law):
     name = "calls"
     title = "results do not depend on how a renderer calls the BSDF"
     everywhere = False  # it does not depend on the parameter values
-    meaning = "Tests pass but pictures are wrong: only integrators use these calls, batches and masks."
+    meaning = "Unit tests pass but pictures are wrong: only integrators call a BSDF in these ways."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
-        finding = Finding(0.0, 0.0, "no difference is allowed", shown="agree")
+        finding = Finding(0.0, 0.0, "no difference is allowed", shown="no differences")
         checked = []
         others: Iterable[Answer] = subject.model.renderer_calls(seed) if isinstance(subject.model, BSDF) else ()
         wrong: list[Answer] = []
@@ -49,7 +49,7 @@ class Calls(Law):
         finding.notes.append(f"checked: {', '.join(dict.fromkeys(checked))}")
         finding.figure = float(len(finding.problems))
         if finding.problems:
-            finding.shown = f"{len(finding.problems)} differ{'s' if len(finding.problems) == 1 else ''}"
+            finding.shown = f"{len(finding.problems)} difference{'' if len(finding.problems) == 1 else 's'}"
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
@@ -57,7 +57,7 @@ class Calls(Law):
         wrong: list[Answer] = finding.details  # type: ignore[assignment]
         worst = max(wrong, key=lambda answer: answer.share)
         if worst.share > 0.0:
-            return severity.Bias(min(worst.worst, 1.0), min(worst.share, 1.0), 0.0, f"of {worst.what}", "bias")
+            return severity.Bias(min(worst.worst, 1.0), min(worst.share, 1.0), 0.0, f"caused by {worst.what}", "bias")
         names = ", ".join(dict.fromkeys(answer.what for answer in wrong))
         return severity.Bias(0.0, 0.0, 0.0, f"only callers of {names} are affected", "interface")
 
@@ -68,7 +68,7 @@ class Calls(Law):
                 name, other, wo, wi, got, all_rows = answer.rows
                 yield Ratio(name, other, wo, wi, got, all_rows, subject)
         for answer in wrong:
-            words = SUSPECTS.get(answer.what, f"{answer.what}, not the formula: {answer.wrong}")
+            words = SUSPECTS.get(answer.what, f"{answer.what} (not the formula): {answer.wrong}")
             if answer.what == "declared facts":
                 guess = next((guess for start, guess in FACTS.items() if answer.wrong.startswith(start)), "")
                 words = f"{answer.wrong}: {guess}?" if guess else answer.wrong
@@ -76,21 +76,21 @@ class Calls(Law):
 
 
 # the probable mistake behind a result that depends on the call
-_ROWS = "the result depends on the number of rows: an index or a buffer of fixed size?"
-_OTHER_ROWS = "the result of a row depends on the other rows: a sum, a mean or a branch over all of them?"
+_RAYS = "the result depends on the number of rays: an index or a buffer of fixed size?"
+_OTHER_RAYS = "the result for a ray depends on the other rays: a sum, a mean or a branch over all of them?"
 SUSPECTS = {
-    "a million rows": _ROWS,
-    "one row at a time": _ROWS,
-    "rows in another order": _OTHER_ROWS,
-    "half the rows disabled": _OTHER_ROWS,
-    "textured parameters": "the value of one ray is used for others: derived once for all of them?",
-    "a new object": "a call changes the results of later ones: state stored in the object?",
+    "a million rays per call": _RAYS,
+    "one ray per call": _RAYS,
+    "rays in another order": _OTHER_RAYS,
+    "half of the rays disabled": _OTHER_RAYS,
+    "textured parameters": "the value of one ray is used for other rays: is it derived only once for all of them?",
+    "a new object": "a call changes the results of later calls: state stored in the object?",
 }
 # the mistake of the formula or of the declaration, by the first words of the difference from the declared facts
 FACTS = {
-    "light is transmitted": "a side that eval or sample does not test, or keeps by an absolute value; else declare it",
-    "it reflects light from below": "a side that is not tested, or an absolute value; else declare it",
-    "eta of a reflected sample": "total reflection with the eta of refraction, or a refracted sample that is kept",
+    "light is transmitted": "a missing test of the side, or an absolute value; if intended, declare it",
+    "light is reflected from below": "a missing test of the side, or an absolute value; if intended, declare it",
+    "eta of a reflected sample": "total internal reflection with the eta of refraction, or a refracted sample kept",
 }
 
 
@@ -170,7 +170,7 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
     def some(rows: Any, answers: dict[str, np.ndarray] = first) -> dict[str, np.ndarray]:
         return {name: value[rows] for name, value in answers.items()}
 
-    twice = _unlike("the same call twice", first, second, wo, wi, 0.0)
+    twice = _unlike("a repeated call", first, second, wo, wi, 0.0)
     if twice.wrong:
         yield twice._replace(wrong=f"{twice.wrong}: declare `stochastic = True` if its values are random")
         return
@@ -182,20 +182,20 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
     for row in range(5):
         one = slice(row, row + 1)
         (single,) = _answers(subject, wo[one], wi[one], u[one], precision)
-        answer = _unlike("one row at a time", some(one), single, wo[one], wi[one], same)
+        answer = _unlike("one ray per call", some(one), single, wo[one], wi[one], same)
         if answer.wrong:
             break
     yield answer
     if precision == "float32":
         (many,) = _answers(subject, wo, wi, u, precision, lanes=LARGE // len(wo) * len(wo))
-        yield _unlike("a million rows", first, many, wo, wi, same)
+        yield _unlike("a million rays per call", first, many, wo, wi, same)
     order = np.random.default_rng(5).permutation(len(wo))
     (mixed,) = _answers(subject, wo[order], wi[order], u[order], precision)
-    yield _unlike("rows in another order", some(order), mixed, wo[order], wi[order], same)
+    yield _unlike("rays in another order", some(order), mixed, wo[order], wi[order], same)
     live = np.arange(len(wo)) % 2 == 0
     a, b, c = (np.where(live[:, None], w, np.nan) for w in (wo, wi, u))
     (enabled,) = _answers(subject, a, b, c, precision)
-    yield _unlike("half the rows disabled", some(live), some(live, enabled), wo[live], wi[live], same)
+    yield _unlike("half of the rays disabled", some(live), some(live, enabled), wo[live], wi[live], same)
 
 
 def _unlike(
@@ -206,7 +206,7 @@ def _unlike(
     for name, a in first.items():
         b = second[name]
         if a.shape != b.shape:
-            return Answer(what, f"{name} has shape {b.shape}, and otherwise {a.shape}")
+            return Answer(what, f"{name} has shape {b.shape} instead of {a.shape}")
         keep = np.isfinite(a).all(1)
         if name in ("sample's wi", "sample's eta"):
             keep &= lit
@@ -219,7 +219,7 @@ def _unlike(
         wrong = off > same
         if wrong.sum() > (0 if same == 0.0 else 0.002 * len(off)) or np.any(off > 0.1):
             row = int(np.argmax(off))
-            text = f"{name} is {_short(b[row])} instead of {_short(a[row])}, {pair_in_words(wo[row], wi[row])}"
+            text = f"{name} is {_short(b[row])} instead of {_short(a[row])}; {pair_in_words(wo[row], wi[row])}"
             total = float(np.sum(np.abs(a[keep])))
             share = float(np.sum(np.nan_to_num(difference, nan=0.0))) / total if total > 0.0 else 0.0
             return Answer(what, text, share, min(float(off[row]), 1.0))
@@ -240,7 +240,7 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
     off = np.abs(radiance - power).max(1) / np.where(lit, size, 1.0) * (lit & ~through)
     if off.max(initial=0.0) > same:
         row = int(np.argmax(off))
-        return f"reflection changes by {off[row]:.2g} with the mode, {pair_in_words(wo[row], wi[row])}"
+        return f"reflection depends on the mode, by {off[row]:.2g}; {pair_in_words(wo[row], wi[row])}"
     for side in (1.0, -1.0):
         rows = lit & through & (wo[:, 2] * side > 0.0) & (power.min(1) > 0.0)
         if rows.sum() < 8:
@@ -248,7 +248,7 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
         ratio = radiance[rows].sum(1) / power[rows].sum(1)
         if np.ptp(ratio) > max(10.0 * same, 1e-3) * np.median(ratio):
             ends = f"from {ratio.min():.4g} to {ratio.max():.4g}"
-            return f"radiance over power in transmission varies {ends}: an index has one factor"
+            return f"in transmission, the ratio of radiance to power varies {ends}, but an index gives one factor"
     return ""
 
 
@@ -280,7 +280,7 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
     each = {name: np.where(odd[:, None], separate[1][name], first) for name, first in separate[0].items()}
     names = " and ".join(list(ends[0])[:3])
     answer = _unlike("textured parameters", each, mixed, wo, wi, SAME[subject.best])
-    yield answer._replace(wrong=f"{answer.wrong}, {names} from ray to ray") if answer.wrong else answer
+    yield answer._replace(wrong=f"{answer.wrong}; {names} varying from ray to ray") if answer.wrong else answer
 
 
 def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
@@ -291,7 +291,7 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
         off = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), np.abs(b)), SMALL * np.abs(a).max(initial=1e-3))
         row = int(np.argmax(off.max(1)))
         if off[row].max() > SAME[subject.best]:
-            return f"{name} changes by {off[row].max():.2g} with the mode, {pair_in_words(wo[row], wi[row])}"
+            return f"{name} depends on the mode, by {off[row].max():.2g}; {pair_in_words(wo[row], wi[row])}"
     return ""
 
 
@@ -309,29 +309,31 @@ def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> s
     across, sampled_across = o[:, 2] * i[:, 2] < 0.0, o[:, 2] * drawn.wi[:, 2] < 0.0
     if not subject.transmits:
         if np.any(bright & across) or np.any(lit & sampled_across):
-            return "light is transmitted, but `transmits` says that none is"
+            return "light is transmitted, but `transmits` is False"
         below = np.any(bright & (o[:, 2] < 0.0)) or np.any(lit & (o[:, 2] < 0.0))
         same, other = bool(getattr(model, "two_sided", True)), bool(getattr(model, "back_differs", False))
         if below and not (same or other) and subject.best == "float64":
-            return "it reflects light from below, but none of `transmits`, `two_sided` and `back_differs` says so"
+            return "light is reflected from below, but none of `transmits`, `two_sided` and `back_differs` declares it"
         if same and not other and subject.best == "float64" and 1 in subject.sides:
             flip = np.array([1.0, 1.0, -1.0])
             up = [np.concatenate([w[:, :2], np.abs(w[:, 2:])], 1) for w in (wo, wi)]
             over, under = subject.eval(up[0], up[1]), subject.eval(up[0] * flip, up[1] * flip)
             off = np.abs(over - under).max(1)
             if np.any(off > 1e-3 * np.maximum(over.max(1), SMALL * max(float(over.max(initial=0.0)), 1e-3))):
-                return "`two_sided` says that both sides are the same, but their values differ: `back_differs`?"
+                return "`two_sided` declares both sides equal, but their values differ: declare `back_differs`?"
     fact = getattr(model, "delta", "maybe")
     if fact == "never" and np.any(lit & drawn.delta):
-        return 'it has delta samples, but `delta` says "never"'
+        return 'some samples are delta samples, but `delta` is "never"'
     if fact == "always" and (np.any(lit & ~drawn.delta) or bright.any()):
-        return 'it has light outside of delta lobes, but `delta` says "always"'
+        return 'light leaves outside of delta lobes, but `delta` is "always"'
     if np.any(lit & ~(np.isfinite(drawn.eta) & (drawn.eta > 0.0))):
         row = int(np.argmax(lit & ~(np.isfinite(drawn.eta) & (drawn.eta > 0.0))))
-        return f"eta of a sample is {drawn.eta[row]:.4g}; the index on wi's side over that on wo's expected"
+        return (
+            f"eta of a sample is {drawn.eta[row]:.4g}, but the index on wi's side divided by that on wo's is expected"
+        )
     wrong = lit & ~sampled_across & (np.abs(drawn.eta - 1.0) > 1e-6)
     if wrong.any():
-        return f"eta of a reflected sample is {drawn.eta[int(np.argmax(wrong))]:.4g}, 1 expected"
+        return f"eta of a reflected sample is {drawn.eta[int(np.argmax(wrong))]:.4g} instead of 1"
     return ""
 
 

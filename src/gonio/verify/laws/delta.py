@@ -43,15 +43,15 @@ class DeltaLobes(Law):
         radiance = lobes.of(subject, wo, seed)
         power = lobes.of(subject, wo, seed, "importance") if subject.transmits else radiance
         if not radiance.valid.any() and not power.valid.any():
-            raise DoesNotApply("it has no delta lobe")
+            raise DoesNotApply("the material has no delta lobes")
         if subject.perturbs_normal:
-            raise DoesNotApply("it perturbs the normal, but the law concerns that of the surface")
+            raise DoesNotApply("the material perturbs the normal, but the law refers to the surface normal")
         exact = subject.best == "float64"
         tolerance = EXACT if exact else lobe_checks.SINGLE
         finding = Finding(
             figure=0.0,
             tolerance=tolerance,
-            reason="a few roundings" if exact else "a few roundings of float32",
+            reason="a few rounding errors" if exact else "a few rounding errors of float32",
             shown=_count(radiance),
         )
         probe = Probe(subject, wo, radiance, power, seed)
@@ -66,7 +66,7 @@ class DeltaLobes(Law):
         if misses:
             worst = max(misses, key=lambda miss: miss.size)
             finding.figure = worst.size
-            finding.shown = f"off by {worst.size:.2g}" if np.isfinite(worst.size) else "no such lobe"
+            finding.shown = f"off by {worst.size:.2g}" if np.isfinite(worst.size) else "a lobe is missing"
             finding.worst = _pair(worst)
         finding.trials += _frequencies(subject, effort, seed)
         return finding
@@ -77,7 +77,7 @@ class DeltaLobes(Law):
         if not misses:
             return estimators.sampling_bias(subject)  # chosen more or less often than stated
         worst = max(misses, key=lambda miss: miss.average)
-        where = f"wo at {angles(worst.wo)} degrees, in its delta lobe"
+        where = f"wo at {angles(worst.wo)} degrees, in the delta lobe"
         size, average = min(worst.size, 1.0), min(worst.average, 1.0)
         return severity.Bias(size, average, worst.share, where, "bias")
 
@@ -98,19 +98,19 @@ def _choice(share: np.ndarray, pdf: np.ndarray, carried: np.ndarray) -> str:
         return ""
     share, pdf, weight = share[sampled], pdf[sampled], (carried[sampled] / pdf[sampled][:, None]).max(1)
     if np.all(np.abs(pdf - 1.0) < 1e-6) and np.mean(share < 0.97) > 0.2:
-        return "the pdf of delta samples is 1, but they are part of the draws: the probability of the choice?"
+        return "the pdf of delta samples is 1, but only some samples are delta samples: the probability of the lobe?"
     factor = weight / pdf
     if np.ptp(pdf) > 0.1 and np.ptp(factor) < 1e-3 * factor.mean():
-        return "the weight of delta samples is proportional to the probability of their choice: not divided by it?"
+        return "the weight of delta samples is proportional to the probability of the lobe: a missing division by it?"
     off = np.abs(share - pdf)
     if np.mean(off > 0.03) > 0.2:
         row = int(np.argmax(off))
-        words = f"lobes are chosen with another probability than their pdf states, {share[row]:.2g} and {pdf[row]:.2g}"
+        words = f"a lobe is chosen with probability {share[row]:.2g}, but its pdf is {pdf[row]:.2g}"
         clamped = off > 0.03
         one = float(np.median(share[clamped]))
         if np.abs(share[clamped] - one).max() < 0.02 or np.abs(share[clamped] - 1.0 + one).max() < 0.02:
-            return f"{words}: the choice is clamped?"
-        return f"{words}: two formulas for the choice?"
+            return f"{words}: is the probability clamped in one of the two?"
+        return f"{words}: two different formulas for the probability?"
     return ""
 
 
@@ -166,7 +166,7 @@ def _frequencies(subject: Subject, effort: Effort, seed: int) -> list[Trial]:
         def repeat(row: int = int(row), lobe: int = int(lobe)) -> float:
             return p_value(row, lobe, seed + 7919)
 
-        text = f"frequency of the lobe toward {angles(known.wi[row, lobe])}, wo at {angles(wo[row])}"
+        text = f"frequency of the lobe at wi = {angles(known.wi[row, lobe])}, wo at {angles(wo[row])} degrees"
         trials.append(Trial(p_value(int(row), int(lobe), seed), text, repeat))
     return trials
 

@@ -27,8 +27,8 @@ from .base import Law, pairs, where_found
 GAIN = 1e-3
 PROBES = 4096  # pairs of directions at which eval is tested before it is integrated
 FINER = 100.0  # how many times as accurate an integral is when it is repeated
-STATED = "the albedo that is stated"
-LOST = "white furnace loses"
+STATED = "the stated albedo"
+LOST = "loss in a white furnace:"
 COARSE = (10.0, 40.0, 60.0, 80.0)  # degrees of wo at which the parameters behind a loss are sought
 MOST_ALONE = 6  # parameters that are made lossless one at a time
 ELSEWHERE = 88.0  # degrees of the most oblique view at other parameter values
@@ -46,9 +46,7 @@ class Energy(Law):
     number = 3
     name = "energy"
     title = "directional albedo <= 1; quadrature and sampling agree"
-    meaning = (
-        "Above 1, every bounce adds light and interiors glow; every bounce lacks the light that a white furnace loses."
-    )
+    meaning = "An albedo above 1 adds light at each bounce, so that interiors glow; too low an albedo loses light."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         wo = _views(subject, effort)
@@ -78,7 +76,8 @@ class Energy(Law):
                 second = _sampling(subject, wo[i : i + 1], effort.furnace_samples, seed + 7919)
                 return _agreement(*(part[0] for part in (*integral, *second)))
 
-            text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
+            text = f"albedo {value[i].mean():.5f} by quadrature, {mean[i].mean():.5f} by sampling"
+            text += f" at {theta[i]:.4g} degrees"
             finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
         _stated(subject, wo, value, error, finding)
@@ -92,7 +91,7 @@ class Energy(Law):
             self._furnace(white, wo, effort, seed, finding, curves)
             self._one_at_a_time(subject, wo, effort, seed, finding)
         if not defined:
-            finding.notes.append("where eval is not finite, it counts as 0")
+            finding.notes.append("values of eval that are not finite count as 0")
             if finding.figure <= GAIN:
                 finding.figure, finding.shown = np.nan, "eval is not finite"
         finding.evidence = curves
@@ -108,7 +107,7 @@ class Energy(Law):
             white = lossless_variant(subject)
             if white is not None and biases[-1].average == 0.0:
                 gained = estimators.gain_bias(white)
-                biases.append(dataclasses.replace(gained, where=f"{gained.where}, of the lossless variant"))
+                biases.append(dataclasses.replace(gained, where=f"{gained.where}, for the lossless variant"))
         others = [problem for problem in finding.problems if not problem.startswith(STATED)]
         if others and (white := _judged_lossless(subject)) is not None:
             biases.append(estimators.loss_bias(white))
@@ -168,8 +167,8 @@ class Energy(Law):
                 factor = written(float(a.mean()))
                 guess = "a constant factor"
                 if factor == "2":
-                    guess = "a constant factor, a lobe counted twice, or light to both sides of the surface"
-                words = f"it reflects {factor} times the incident light for every wo: {guess}?"
+                    guess = "a constant factor, a lobe counted twice, or light sent to both sides of the surface"
+                words = f"the albedo is {factor} for every wo: {guess}?"
                 yield Cause(words, factor_key(float(a.mean())))
             return
         bad = np.abs(a - 1.0) > SPREAD
@@ -177,7 +176,7 @@ class Energy(Law):
         # a sharp edge, not a gradual rise
         if place and np.abs(a[bad] - 1.0).min() > 0.1 * np.abs(a[bad] - 1.0).max():
             words = f"{place.replace('from wi', 'from wo')}"
-            yield Cause(f"it reflects all incident light, but {np.median(a[bad]):.4g} times as much {words}", words)
+            yield Cause(f"the albedo is 1, but {np.median(a[bad]):.4g} {words}", words)
 
     def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
         """Check that the closed form of a material's albedo equals the integral of `eval`."""
@@ -210,8 +209,10 @@ class Energy(Law):
         if gain > finding.figure:
             finding.figure = gain
             if gain > GAIN:
-                finding.shown = f"gain {gain:.4f} of the lossless variant"
-            finding.worst = f"white furnace, wo at {theta[int(np.argmax(value.max(1)))]:.4g} degrees: {value.max():.5f}"
+                finding.shown = f"gain {gain:.4f} in a white furnace"
+            finding.worst = (
+                f"white furnace, wo at {theta[int(np.argmax(value.max(1)))]:.4g} degrees: albedo {value.max():.5f}"
+            )
         lost = np.round(1.0 - value.mean(1), 6) + 0.0  # not -0
         above = wo[:, 2] > 0.0
         order = np.argsort(wo[above, 2])
@@ -222,18 +223,18 @@ class Energy(Law):
         where = int(np.argmax(lost))
         if average < 0.0:
             most = int(np.argmin(lost))
-            text = f"white furnace gains {-average:.4f} on average, {-lost[most]:.4f} at {theta[most]:.4g} degrees"
+            text = f"gain in a white furnace: {-average:.4f} on average, {-lost[most]:.4f} at {theta[most]:.4g} degrees"
         else:
             text = f"{LOST} {average + 0.0:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
         known = float(error.max())
-        finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
+        finding.notes.append(text + (f", accurate to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
         claim = getattr(white.model, "lossless_tolerance", None)
         # a claim is about the given values: others, such as a weight of 0, may leave nothing to reflect
         judged = effort.full or value.max() > 0.0
         if claim is not None and judged and lost[where] > claim + float(error.max()):
             finding.problems.append(
-                f"{LOST} {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
+                f"{LOST} {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the declared {claim:g}"
             )
 
     def _one_at_a_time(self, subject: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding) -> None:
@@ -287,8 +288,8 @@ def _never_sampled(curves: AlbedoCurves) -> Iterator[Cause]:
     for sign, side in ((1.0, "above"), (-1.0, "below")):
         mine = curves.wo[:, 2] * sign > 0.0
         if mine.any() and not curves.sampling[mine].any() and curves.quadrature[mine].max(1).min() > GAIN:
-            words = f"for wo {side} the surface no sample carries light, but eval is positive"
-            yield Cause(f"{words}: a test of the side that one of them lacks?", f"never sampled from {side}")
+            words = f"for wo {side} the surface, no sample carries light although eval is positive"
+            yield Cause(f"{words}: a test of the side that is missing in one of the two?", f"never sampled from {side}")
 
 
 def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:

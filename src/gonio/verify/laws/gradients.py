@@ -41,9 +41,9 @@ class Gradients(Law):
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if "float64" not in subject.precisions:
-            raise DoesNotApply("finite differences need 64 bits, which this variant of Mitsuba does not have")
+            raise DoesNotApply("finite differences need 64 bits, but this variant of Mitsuba is 32-bit")
         if subject.stochastic:
-            raise DoesNotApply("the model is stochastic: its single values are random")
+            raise DoesNotApply("the material is stochastic: individual values are random")
         if not subject.has_density:
             raise DoesNotApply("all lobes are delta lobes, which have no values to differentiate")
         wo, wi = pairs(subject, effort.pairs // 8, seed)
@@ -55,9 +55,7 @@ class Gradients(Law):
             parameter = labels[label]
             if max(np.max(np.abs(differences)), np.max(np.abs(exact))) < least:
                 if _steps(subject, label, parameter, wo, wi):
-                    problems.append(
-                        f"the derivative by {label} is 0 everywhere, but the values change with it in steps"
-                    )
+                    problems.append(f"the derivative with respect to {label} is 0, but values change with it in steps")
                 continue
             tried.append(label)
             skipped = max(skipped, 1.0 - float(smooth.mean()))
@@ -74,35 +72,35 @@ class Gradients(Law):
             if size > worst:
                 worst, place, name = size, row, label
         if not tried and not problems:
-            raise DoesNotApply("no parameter changes its values")
+            raise DoesNotApply("no parameter affects the values")
         return Finding(
             figure=worst,
             tolerance=TOLERANCE,
-            reason="float64 differences are accurate to about 1e-6; edges, where two steps disagree, are left out",
+            reason="finite differences are accurate to about 1e-6; kinks, where two step sizes disagree, are left out",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             problems=problems,
-            notes=[f"tried: {', '.join(tried)}; {100.0 * skipped:.2f} % of the pairs lie on edges"],
+            notes=[f"tested: {', '.join(tried)}; {100.0 * skipped:.2f} % of pairs left out at kinks of eval"],
         )
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Bias:
         name, _, _, exact, differences = self._worst(subject, finding, seed)
         size = float(np.sum(np.abs(exact - differences)) / max(float(np.sum(np.abs(differences))), 1e-30))
-        return Bias(finding.figure, size, 1.0, f"by {name}", "derivatives")
+        return Bias(finding.figure, size, 1.0, f"with respect to {name}", "derivatives")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio]:
         name, wo, wi, exact, differences = self._worst(subject, finding, seed)
         size = _size(tree.value_at(subject.model, name))
         yield Ratio(
-            f"autodiff by {name}",
-            "differences",
+            f"autodiff with respect to {name}",
+            "finite differences",
             wo,
             wi,
             exact,
             differences,
             subject,
             numbers={f"2 {name}": 2.0 * size, f"1 / (2 {name})": 0.5 / size},
-            zero="a value that is detached, rounded or branched on before autodiff",
+            zero="a value that is detached, rounded or compared in a branch, so that autodiff stops there",
         )
 
     def _worst(

@@ -37,7 +37,7 @@ class Isotropy(Law):
         if not subject.has_density:
             raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         if subject.stochastic:
-            raise DoesNotApply("the model is stochastic; its samples are compared with its pdf by another law")
+            raise DoesNotApply("the material is stochastic: the law `pdf` compares its samples with its pdf instead")
         exact = subject.best == "float64"
         wo, wi = pairs(subject, effort.pairs, seed, exact)
         turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
@@ -50,9 +50,9 @@ class Isotropy(Law):
         finding = Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
-            reason="a rotation rounds a direction at 1e-16; formulas with cancellation lose up to ten digits"
+            reason="rotating directions has rounding errors of 1e-16; formulas with cancellation lose up to ten digits"
             if exact
-            else "float32: beyond 8 roundings of the directions, the rest is the model's own sums",
+            else "float32, beyond a change of both directions by 8 ulps: rounding errors of the model's own sums",
             worst=pair_in_words(wo[row], wi[row]),
             at=(wo[row], wi[row]),
         )
@@ -61,11 +61,11 @@ class Isotropy(Law):
         finding.shown = f"changes by {size:.2g} under rotation"
         finding.tolerance, finding.figure = 0.0, 0.0
         finding.reason = (
-            "declared anisotropic: a rotation must change values, and the wider axis must be the declared one"
+            "declared anisotropic: rotation must change the values, and the wider axis must be the declared one"
         )
         if size < VISIBLE and effort.full and not self._drawn_along_axes(subject, (wo, wi), rotated):
             # at other parameter values it may be isotropic
-            finding.problems.append(f"declared anisotropic, but a rotation changes it by {size:.1e} at most")
+            finding.problems.append(f"declared anisotropic, but rotation changes the values by {size:.1e} at most")
         self._axes(subject, finding)
         self._rotated_together(subject, finding, (wo, wi), exact)
         return finding
@@ -90,9 +90,9 @@ class Isotropy(Law):
         row, size = worst_of(self._error(there, back, exact, noise))
         finding.figure, finding.tolerance = size, EXACT if exact else SINGLE
         finding.at, finding.worst = (wo[row], wi[row]), pair_in_words(wo[row], wi[row])
-        finding.notes.append(f"axes and directions rotated together: differs by {size:.1e}")
+        finding.notes.append(f"change if axes and directions rotate together: {size:.1e}")
         if size > finding.tolerance:
-            finding.shown = f"changes by {size:.2g} if axes and directions turn together"
+            finding.shown = f"changes by {size:.2g} if axes and directions rotate together"
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
         swapped = _swapped(subject) if not subject.isotropic else None
@@ -110,14 +110,14 @@ class Isotropy(Law):
             turn = 1.0 + 40.0 * wo[:, 2] + 13.0 * wo[:, 0]
             return subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
 
-        where = ", against the other axes" if swapped is not None else ", under rotation"
+        where = ", compared with exchanged axes" if swapped is not None else ", under rotation"
         where = ", with axes and directions rotated together" if other is not None else where
         return severity.between(subject, rotated, where)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         if any("axes swapped" in problem for problem in finding.problems):
             yield Cause(
-                "the wider axis has the smaller width: alpha_x and alpha_y exchanged?",
+                "the lobe is wider along the axis with the smaller alpha: alpha_x and alpha_y exchanged?",
                 "axes exchanged",
             )
         elif not subject.isotropic and finding.figure > finding.tolerance:
@@ -127,14 +127,16 @@ class Isotropy(Law):
             turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
             there, back = subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
             if np.mean(np.abs(there - back) > 1e-3 * np.maximum(there, back)) < 1e-3:
-                words = "values change when both directions are mirrored, and not when they rotate: a lobe to one side"
-                yield Cause(f"{words}, as from a sine of the azimuth between them, or a cross product?", "handed")
+                words = (
+                    "values change when both directions are mirrored, but not when they rotate: a lobe on one side only"
+                )
+                yield Cause(f"{words}, due to the sine of an azimuth difference or a cross product?", "handed")
                 return
             off = np.mean(np.abs(there - back) > 1e-3 * np.maximum(there, back), axis=0)
             names = [name for name, share in zip(("red", "green", "blue"), off, strict=False) if share > 0.01]
             where = f" in {' and '.join(names)}" if len(off) == 3 and 0 < len(names) < 3 else ""
-            words = f"values change{where} when both directions rotate about the normal: `isotropic` should be False"
-            yield Cause(f"{words}, or does the formula depend on a tangent?", "turns")
+            words = f"values change{where} when both directions rotate about the normal: should `isotropic` be False"
+            yield Cause(f"{words}, or is a tangent used by mistake?", "turns")
 
     def _cause_of_turn(self, subject: Subject, seed: int) -> Cause:
         """The cause if the axes rotate the wrong way, or if only parts of the formula rotate."""
@@ -144,9 +146,11 @@ class Isotropy(Law):
         back = np.full(len(wo), -TURN)
         there, clockwise = subject.eval(wo, wi), other.eval(directions.rotated(wo, back), directions.rotated(wi, back))
         if np.mean(np.abs(there - clockwise) > 1e-3 * np.maximum(there, clockwise)) < 1e-3:
-            return Cause(f"{ROTATION} turns the axes clockwise; the convention is counterclockwise", "turn reversed")
+            return Cause(
+                f"{ROTATION} rotates the axes clockwise, but the convention is counterclockwise", "turn reversed"
+            )
         return Cause(
-            f"only a part of the formula turns with {ROTATION}: a term uses directions of the other frame", "turn"
+            f"only part of the formula rotates with {ROTATION}: a term uses directions in the unrotated frame", "turn"
         )
 
     def _difference(

@@ -37,15 +37,15 @@ class Limits(Law):
 
     number = 12
     name = "limits"
-    title = "layers that are switched off change nothing"
-    meaning = "A layer of weight 0 tints its base; a texture of weights shows a step where the layer ends."
+    title = "layers that are switched off have no effect"
+    meaning = "A layer of weight 0 tints its base; a weight texture shows a visible edge where the layer ends."
     everywhere = False
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if not isinstance(subject.model, BSDF):
-            raise DoesNotApply("a plugin declares no limits")
+            raise DoesNotApply("plugins do not declare limits")
         if subject.stochastic:
-            raise DoesNotApply("the model is stochastic: its single values are random")
+            raise DoesNotApply("the material is stochastic: individual values are random")
         if not subject.has_density:
             raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         wo, wi = pairs(subject, effort.pairs // 8, seed, exact=True)
@@ -98,22 +98,22 @@ class _Case(NamedTuple):
 
 def _finding(cases: list[_Case], wo: np.ndarray, wi: np.ndarray) -> Finding:
     if not cases:
-        raise DoesNotApply("none of its limits can be compared at these values")
+        raise DoesNotApply("none of the declared limits can be tested at these parameter values")
     worst = max(cases, key=lambda case: case.size)
     row, figure = worst_of(worst.error)
     failed = [case for case in cases if case.size > TOLERANCE]
     limits = list(dict.fromkeys(case.words.removeprefix("where ") for case in cases))
-    said = [f"{case.words}: {case.against}, by {case.size:.2g}" for case in failed]
+    said = [f"{case.words}, {case.against} by {case.size:.2g}" for case in failed]
     return Finding(
         figure=figure,
         tolerance=TOLERANCE,
-        reason=f"{ROUNDINGS} roundings of 64 bits, relative to the value or to the 90th percentile of all",
+        reason=f"{ROUNDINGS} float64 ulps, relative to the value or to the 90th percentile of all values",
         worst=f"{worst.words}: {pair_in_words(wo[row], wi[row])}",
         at=(wo[row], wi[row]) if failed else None,
         settings=dict(worst.limit.values) if failed else {},
         problems=[text for text, case in zip(said, failed, strict=True) if not case.number][:6],
         notes=[
-            f"{len(limits)} {'limits' if len(limits) > 1 else 'limit'}: {'; '.join(limits)}",
+            f"{len(limits)} declared {'limits' if len(limits) > 1 else 'limit'}: {'; '.join(limits)}",
             *(text for text, case in zip(said, failed, strict=True) if case.number),
         ],
         breach=max((case.size for case in cases if case.number), default=0.0),
@@ -144,7 +144,7 @@ def _cases(subject: Subject, wo: np.ndarray, wi: np.ndarray, seed: int) -> list[
         given = np.arange(count) % 4 == 0
         limited = subject.replace(**limit.values)
         plain = np.where(given[:, None], limited.eval(wo, wi), values[n])
-        text = "as a number it has other values than in an array"
+        text = "values for a number and for an array differ"
         cases.append(_case(limit, text, one, _Side(limited, plain), wo, wi, number=True))
         names = [path for path in changed[n] if changed[n][path] is not blocks[n][path]]
         if names:
@@ -206,7 +206,7 @@ def _against_model(limit: Limit, one: _Side, wo: np.ndarray, wi: np.ndarray) -> 
         return []
     other = of(limit.equals(one.subject.model))
     side = _Side(other, other.eval(wo, wi))
-    return [_case(limit, "it differs from the model without it", one, side, wo, wi)]
+    return [_case(limit, "eval differs from the model without the layer", one, side, wo, wi)]
 
 
 class _Side(NamedTuple):
@@ -324,7 +324,7 @@ def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
     names = [axis for axis in ranges.axes(subject) if axis.low == 0.0 and any(word in axis.path for word in WORDS)]
     names = [axis for axis in names if "." not in axis.path and axis.kind == "float"]
     if not names:
-        raise DoesNotApply("it declares no `limits`, and has no weight or thickness that may be 0")
+        raise DoesNotApply("the material declares no `limits`, and has no weight or thickness that can be 0")
     figure, worst, row, value = 0.0, names[0].path, 0, 0.0
     for axis in names:
         try:
@@ -341,12 +341,12 @@ def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
     return Finding(
         figure=figure,
         tolerance=1e-3,
-        reason="a part that fades out leaves no step",
-        worst=f"{worst} = {value:g} against 0: {pair_in_words(wo[row], wi[row])}",
+        reason="a layer that fades out causes no jump",
+        worst=f"{worst} = {value:g} compared with 0: {pair_in_words(wo[row], wi[row])}",
         at=(wo[row], wi[row]) if figure > 1e-3 else None,
         settings={worst: 0.0},
         notes=[
-            "it declares no `limits`: only whether values are continuous at 0 of "
+            "the material declares no `limits`; tested only for continuity at 0: "
             + ", ".join(axis.path for axis in names)
         ],
     )

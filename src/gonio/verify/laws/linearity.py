@@ -18,6 +18,7 @@ from .base import Law, pair_in_words, pairs, relative, worst_of
 
 EXACT, SINGLE = 1e-9, 1e-4
 GRAYS = (0.125, 0.3125, 0.5, 0.875)  # colors at which values are compared
+MIXED = "a mix with another material"  # the case "mix" in the list of tested cases
 POWERS = np.geomspace(0.2, 6.0, 4001)  # exponents of a color that values may follow
 
 
@@ -30,41 +31,42 @@ class Linearity(Law):
 
     number = 7
     name = "linearity"
-    title = "linear in albedos; a mix is the mix of the values"
-    meaning = "Textures that are filtered or blended before shading do not look like the average of their colors."
+    title = "linear in albedos; a mix of materials is the mix of their values"
+    meaning = "Textures filtered or blended before shading do not look like the average of their colors."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if not subject.has_density:
             raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         if subject.stochastic:
-            raise DoesNotApply("the model is stochastic: its single values are random")
+            raise DoesNotApply("the material is stochastic: individual values are random")
         wo, wi = pairs(subject, effort.pairs // 4, seed)
         cases = [(name.partition(":")[0], name, *pair(wo, wi)) for name, pair in _pairs(subject).items()]
         if not cases:
-            raise DoesNotApply("it has no albedo to change, and is not a Gonio material that could be mixed")
+            raise DoesNotApply("the material has no albedo, and only Gonio materials can be mixed")
         exact = subject.best == "float64"
         tried = list(dict.fromkeys(label for label, *_ in cases))
         dead = [label for label in tried if label != "mix" and effort.full and _is_dead(subject, label, wo, wi)]
-        worst, place, name, notes = -1.0, 0, "", [f"tried: {', '.join(tried)}"]
+        tested = ", ".join(MIXED if label == "mix" else label for label in tried)
+        worst, place, name, notes = -1.0, 0, "", [f"tested: {tested}"]
         tolerance = EXACT if exact else SINGLE
         for label, case, a, b in cases:
             row, size = worst_of(relative(a, b, 0.0, 1e-9 * float(np.max(np.abs(b), initial=0.0))))
             if size > tolerance and case != label:
                 # for example if one layer attenuates another by its brightest channel
-                notes.append(f"{label} is not linear between two colors: off by {size:.2g}")
+                notes.append(f"{label} is not linear between two colors: error {size:.2g}")
                 continue
             if size > tolerance and label != "mix" and _bounces(subject, label, wo, wi, effort.full):
-                notes.append(f"{label} counts more than once, as with several bounces of light: off by {size:.2g}")
+                notes.append(f"{label} acts more than once, as with multiple reflections: {size:.2g} from linear")
                 continue
             if size > worst:
                 worst, place, name = size, row, case
         return Finding(
             figure=max(worst, 0.0),
             tolerance=tolerance,
-            reason="a few roundings" if exact else "a few roundings of float32, some with cancellation",
+            reason="a few rounding errors" if exact else "a few rounding errors of float32, some with cancellation",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
-            problems=[f"{name} changes nothing" for name in dead],
+            problems=[f"{name} has no effect" for name in dead],
             notes=list(dict.fromkeys(notes)),
             details=name,
         )
@@ -77,7 +79,9 @@ class Linearity(Law):
             value, expected = pair(wo, wi)
             return expected, value
 
-        return severity.between(subject, expected_first, f", where {name} is between two others")
+        return severity.between(
+            subject, expected_first, f", for {MIXED if name == 'mix' else f'{name} between two other values'}"
+        )
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         name = finding.worst.partition(":")[0]
@@ -86,7 +90,7 @@ class Linearity(Law):
         wo, wi = pairs(subject, 4096, seed)
         power = _power_of(np.stack([subject.replace(**{name: x}).eval(wo, wi).mean(1) for x in GRAYS]))
         if power is not None:
-            text = f"values follow {name}^{power:.3g}, within 1e-3: a color decoded or multiplied twice?"
+            text = f"values vary as {name}^{power:.3g}, within 1e-3: is a color decoded or multiplied twice?"
             yield Cause(text, f"{name}^{power:.3g}")
         mix = channels.mixed(subject, wo, wi)
         if mix is not None:

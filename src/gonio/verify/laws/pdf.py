@@ -49,7 +49,7 @@ class Pdf(Law):
     samples = True
     name = "pdf"
     title = "pdf integrates to 1, covers eval, and is the density of the samples"
-    meaning = "Multiple importance sampling gives samples wrong weights: energy is lost or gained, or noise persists."
+    meaning = "Multiple importance sampling weights samples incorrectly: energy is lost or gained, or noise persists."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         parts: list[tuple[dict[str, object], Subject]] = [({}, subject)]
@@ -57,7 +57,7 @@ class Pdf(Law):
         finding = Finding(
             figure=0.0,
             tolerance=EXCESS,
-            reason="int pdf is accurate to 1e-4; failed samples make it less than 1, never more",
+            reason="int pdf is accurate to 1e-4; failed samples can only make it less than 1",
             allowed=f"{1.0 + EXCESS:g}",
         )
         lowest, misplaced, largest = 2.0, 0.0, ""
@@ -67,7 +67,7 @@ class Pdf(Law):
                 continue
             for tested in _chi_square(part, effort, seed):
                 wo, cells = tested.wo, tested.cells
-                where = f"{name + ': ' if name else ''}wo at {angles(wo)} degrees"
+                where = f"{name + ', ' if name else ''}wo at {angles(wo)} degrees"
                 for kind, p in tested.outcome._asdict().items():
                     finding.trials.append(Trial(p, f"{_KINDS[kind]}, {where}", _Repeat(part, wo, kind, effort, seed)))
                     # among several p-values of 0, the one with the most misplaced samples
@@ -79,14 +79,15 @@ class Pdf(Law):
                     claimed = float(e.sum()) / cells.drawn
                     if claimed > EXCESS and not o.any():
                         word = "above" if side > 0 else "below"
-                        share = f"{claimed:.2g} of all samples {word} the surface"
-                        text = f"the pdf claims {share}, where none occurs, {where}"
+                        text = f"{UNUSED} {claimed:.2g} {word} the surface, where no sample occurs; {where}"
                         finding.notes[:] = finding.notes or [text]
                 excess = max(tested.total - tested.error - 1.0, 0.0)
                 if excess > finding.figure:
                     finding.figure = excess
-                    largest = f"int pdf = {tested.total:.4g}, {where}"
-        finding.shown = "delta lobes only" if lowest > 1.0 else f"lowest p {lowest:.2g} of {len(finding.trials)}"
+                    largest = f"int pdf = {tested.total:.4g} for {where}"
+        finding.shown = (
+            "delta lobes only" if lowest > 1.0 else f"lowest of {len(finding.trials)} p-values: {lowest:.2g}"
+        )
         if finding.figure > EXCESS:
             finding.shown = largest
         _support(subject, finding, effort, seed)
@@ -130,15 +131,19 @@ class Pdf(Law):
         for view in above[:, None]:
             clamped = _clamped(there, view, seed)
             if clamped:
-                yield Cause(f"{clamped}: a random number that is clamped, which the pdf does not count?", "u clamped")
+                yield Cause(f"{clamped}: a clamped random number, which the pdf does not account for?", "u clamped")
         for view in above[:, None]:
             if _reused(there, view, seed):
-                yield Cause("u.x chooses a lobe and then, not remapped to [0, 1), its direction too?", "u.x twice")
+                yield Cause(
+                    "does u.x select both the lobe and its direction, without being remapped to [0, 1) in between?",
+                    "u.x twice",
+                )
         for note in finding.notes:
-            if note.startswith("the pdf claims"):
+            if note.startswith(UNUSED):
                 yield Cause(note, "pdf where no sample occurs")
 
 
+UNUSED = "the pdf integrates to"  # begins the note about a side that is never sampled
 ALL, LACKING = 0.995, 0.03  # least fraction of samples that do not fail, and of samples that the pdf lacks
 MISSING = 0.01  # largest fraction of samples that the pdf predicts but that do not occur
 STEEP = 0.7  # largest ratio of the pdf's deficit near the normal to its deficit at an oblique view
@@ -156,8 +161,8 @@ def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[C
     near = _chi_square(subject, FEW, seed, directions.single(directions.at(np.array([ABOVE[1][0]]), ABOVE[1][1])))
     if near and 1.0 - near[0].total < STEEP * lacking[-1]:
         shares = ", ".join(f"{share:.2g} at {angles(one.wo)}" for share, one in zip(lacking, above, strict=True))
-        words = f"no sample fails, and the pdf lacks {shares} degrees of wo"
-        guess = "directions from below the horizon that are mirrored up or clamped, where they should fail"
+        words = f"no sample fails, but int pdf is less than 1, by {shares} degrees of wo"
+        guess = "directions below the horizon that are mirrored or clamped instead of failing"
         yield Cause(f"{words}: {guess}?", "samples from below")
 
 
@@ -212,7 +217,7 @@ def _clamped(subject: Subject, wo: np.ndarray, seed: int) -> str:
             if below or above:
                 ends = [f"below {(part.start + low) / SWEEP:.2g}"] if below else []
                 ends += [f"above {(part.stop - high) / SWEEP:.3g}"] if above else []
-                return f"samples do not move while the {name} random number is {' and '.join(ends)}"
+                return f"sampled directions do not change while the {name} random number is {' and '.join(ends)}"
     return ""
 
 
@@ -259,9 +264,9 @@ def _misses_the_middle(wo: np.ndarray, wi: np.ndarray, fine: np.ndarray) -> bool
 
 
 _KINDS = {
-    "fine": "cells",
-    "coarse": "coarse cells",
-    "others": "share of samples outside of all cells against 1 - int pdf",
+    "fine": "chi-square test",
+    "coarse": "chi-square test in coarse cells",
+    "others": "samples outside all cells compared with 1 - int pdf",
 }
 
 
@@ -333,8 +338,10 @@ def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> N
     share = float(np.sum(value[wanting & np.isfinite(value)])) / total
     if np.any(pdf < 0.0):
         row = int(np.argmin(pdf))
-        finding.problems.append(f"pdf is negative, {pdf[row]:.3g}, for {pair_in_words(wo[row], wi[row])}")
+        finding.problems.append(f"pdf is negative ({pdf[row]:.3g}); {pair_in_words(wo[row], wi[row])}")
     if share > SUPPORT:
         row = int(np.argmax(np.where(wanting, value, 0.0)))
-        finding.problems.append(f"eval > 0 where pdf = 0: {share:.2%} of all light, {pair_in_words(wo[row], wi[row])}")
+        finding.problems.append(
+            f"eval > 0 where pdf = 0, for {share:.2%} of the light; {pair_in_words(wo[row], wi[row])}"
+        )
         finding.at = (wo[row], wi[row])

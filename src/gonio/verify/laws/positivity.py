@@ -33,7 +33,7 @@ class Positivity(Law):
 
     number = 1
     name = "positivity"
-    title = "non-negative and finite, at extremes and in gradients"
+    title = "values are finite and non-negative, and gradients are finite"
     meaning = "A NaN blackens its pixel permanently and spreads with every filter; negative light darkens other pixels."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
@@ -42,11 +42,11 @@ class Positivity(Law):
         finding = Finding(
             figure=0.0,
             tolerance=0.0,
-            reason="none is allowed",
+            reason="no value may be negative or not finite",
             notes=[
-                f"{len(variants)} settings: the given one and the ends of each range"
+                f"tested at the given parameter values and the ends of each range ({len(variants)} settings)"
                 if len(variants) > 1
-                else "only the given setting"
+                else "tested at the given parameter values only"
             ],
         )
         declared = "positivity" in subject.breaches  # measured noise around 0: relative to the largest value
@@ -75,14 +75,18 @@ class Positivity(Law):
                         row = int(np.flatnonzero(wrong.any(1))[0])
                         text = f"{what} is {values[row][wrong[row]][0]:.3g} in {precision}"
                         fails(
-                            text, f"{int(wrong.sum())} values, first at ", a[row], b[row], changes[rows[row] // len(wo)]
+                            text,
+                            f"{int(wrong.sum())} values, the first for ",
+                            a[row],
+                            b[row],
+                            changes[rows[row] // len(wo)],
                         )
             if isinstance(together.model, BSDF) and not together.stochastic:
                 for name, row in _bad_gradients(together, many_o, many_i):
                     finding.figure += 1
-                    text = f"the gradient of eval by {name} is not finite"
+                    text = f"the gradient of eval with respect to {name} is not finite"
                     fails(text, "", many_o[row], many_i[row], changes[row // len(wo)])
-        finding.shown = f"{finding.figure:g} of {checked:.3g}"
+        finding.shown = f"{finding.figure:g} of {checked:.3g} values invalid"
         del finding.problems[6:], finding.notes[7:]
         return finding
 
@@ -99,7 +103,7 @@ class Positivity(Law):
             value = there.eval(o, i)
             return value, np.maximum(value, 0.0)
 
-        return severity.between(there, cut, ", where light is negative")
+        return severity.between(there, cut, ", where values are negative")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         there = where_found(subject, finding)
@@ -108,7 +112,7 @@ class Positivity(Law):
             bad = np.any([wrong(there.eval(wo, wi, precision=p)).any(1) for p in there.precisions], axis=0)
             if bad.any():
                 place = origin.of(there.model, wo[bad][0], wi[bad][0]) if isinstance(there.model, BSDF) else ""
-                words = f"it begins with {place}" if place and fault == "not finite" else ""
+                words = f"first caused by {place}" if place and fault == "not finite" else ""
                 for one in self._of_eval(subject, finding, effort, seed, fault, bad):
                     yield dataclasses.replace(one, words="; ".join(filter(None, [one.words, words])))
                 if words:
@@ -194,7 +198,7 @@ def _exact_places(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndar
 
 
 def _words(changed: dict[str, Any]) -> str:
-    return "".join(f", {name} = {value}" for name, value in changed.items())
+    return f" with {', '.join(f'{name} = {value}' for name, value in changed.items())}" if changed else ""
 
 
 def _batches(

@@ -29,9 +29,9 @@ class Precision(Law):
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if "float64" not in subject.precisions:
-            raise DoesNotApply("it has no 64-bit variant to compare with")
+            raise DoesNotApply("there is no 64-bit variant to compare with")
         if subject.stochastic:
-            raise DoesNotApply("the model is stochastic: its single values are random")
+            raise DoesNotApply("the material is stochastic: individual values are random")
         if not subject.has_density:
             raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         wo, wi = pairs(subject, effort.pairs, seed)
@@ -54,8 +54,8 @@ class Precision(Law):
         return Finding(
             figure=worst,
             tolerance=TOLERANCE,
-            reason=f"beyond {ALLOWED:g} roundings (6e-8) of the directions, only sums with cancellation are left",
-            shown=f"{worst:.1e}; 99.9 % within {plain:.1e}",
+            reason=f"beyond a change of the directions by {ALLOWED:g} ulps, only cancellation in sums is left",
+            shown=f"{worst:.1e}; 99.9 % of values agree within {plain:.1e}",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             evidence=RoundingErrors(curve, np.abs(wo[:, 2]), np.abs(wi[:, 2])),
@@ -75,8 +75,8 @@ class Precision(Law):
         # a factor of a product or a power that overflows may make the whole 0, infinite or NaN
         lost = ~np.isfinite(single) | ((single == 0.0) & (exact != 0.0))
         if bad.any() and lost.any(1)[bad].mean() > 0.5:
-            words = "float32 is 0 or not finite where float64 has a value" + (f", {place}" if place else "")
-            yield Cause(f"{words}: a power or an exponential beyond its range, 1e-38 to 3e38?", "overflow")
+            words = "float32 is 0 or not finite where float64 is neither" + (f", {place}" if place else "")
+            yield Cause(f"{words}: a power or an exponential outside of float32's range, 1e-38 to 3e38?", "overflow")
             return
-        words = "float32 loses digits of float64" + (f", {place}" if place else "")
+        words = "float32 has fewer correct digits than expected" + (f", {place}" if place else "")
         yield Cause(f"{words}: a difference of two nearly equal numbers?", "cancellation")

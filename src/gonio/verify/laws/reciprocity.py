@@ -47,11 +47,13 @@ class Reciprocity(Law):
         wo, wi = wo[keep], wi[keep]
         error = _difference(subject, wo, wi, eta, exact)
         row, size = worst_of(error)
-        single = "float32: beyond 8 roundings of the directions, the rest is the model's own sums"
+        single = "float32, beyond a change of both directions by 8 ulps: rounding errors of the model's own sums"
         return Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
-            reason="float64 rounds at 1e-16; formulas with cancellation lose up to ten digits" if exact else single,
+            reason="float64 has rounding errors of 1e-16; formulas with cancellation lose up to ten digits"
+            if exact
+            else single,
             worst=pair_in_words(wo[row], wi[row]),
             at=(wo[row], wi[row]),
             evidence=ReciprocityMap(_map(subject, eta, exact), subject.transmits),
@@ -76,20 +78,20 @@ class Reciprocity(Law):
             wrong = _reciprocal_with(subject, other, seed)
             if wrong:
                 is_inverse = abs(other * eta - 1.0) < 1e-3
-                text = "the inverse of it" if is_inverse else f"{eta:.4g}"
+                text = "the inverse" if is_inverse else f"{eta:.4g}"
                 yield Cause(
-                    f"with the index of its parameter, {other:.4g}, it is reciprocal: `eta` of its samples is {text}",
+                    f"reciprocal for the index of the parameter, {other:.4g}, but `eta` of the samples is {text}",
                     "eta of samples",
                 )
         if abs(eta - 1.0) > 1e-3 and _reciprocal_with(subject, 1.0, seed):
-            text = "f(wo, wi) = f(wi, wo) in transmission too: the factor (eta_o / eta_i)^2 of radiance is missing"
-            yield Cause(f"{text}, or `eta` of its samples should be 1?", "eta^2 in transmission")
+            text = "f(wo, wi) = f(wi, wo) also in transmission: is the factor (eta_o / eta_i)^2 of radiance missing"
+            yield Cause(f"{text}, or should `eta` of the samples be 1?", "eta^2 in transmission")
         wo, wi = pairs(subject, PAIRS, seed, subject.best == "float64")
         there, back = (subject.f(wo, wi) * _scale(wo, wi, eta)[:, None], subject.f(wi, wo))
         yield Ratio("f(wo, wi)", "f(wi, wo)", wo, wi, there, back, subject, antisymmetric=True)
         if subject.isotropic and not subject.transmits and _difference_is_even(subject, seed):
             words = "f(wo, wi) - f(wi, wo) is the same for all azimuths"
-            guess = "a base, or a compensation, that is attenuated for one of the two directions only"
+            guess = "a base layer or compensation term that is attenuated for only one of the two directions"
             yield Cause(f"{words}: {guess}?", "one direction of a base")
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
@@ -113,7 +115,7 @@ class Reciprocity(Law):
         return Finding(
             figure=worst,
             tolerance=np.inf,
-            reason="the model is stochastic: expectations are compared by p-values",
+            reason="the material is stochastic: expectations are compared by p-values",
             shown=f"{worst:.2f} standard errors",
             worst=pair_in_words(wo[place], wi[place]),
             at=(wo[place], wi[place]),

@@ -31,13 +31,13 @@ class Shader(Law):
     everywhere = False
     at_ends = False
     name = "shader"
-    title = "shader code gives the same values"
+    title = "generated shader code gives the same values"
     meaning = "The picture of a real-time engine differs from the offline reference."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         model = subject.model
         if not isinstance(model, BSDF):
-            raise DoesNotApply("it is not a Gonio material, and no shader code is written from it")
+            raise DoesNotApply("shader code is generated for Gonio materials only")
         from ...shaders.program import FUNCTIONS, check  # imported late: 0.1 s, and this law is tested on request only
 
         try:
@@ -89,7 +89,7 @@ def _add(
     finding.figure = max(finding.figure, worst.figure)
     wo, wi, u = (rows[worst.row] for rows in inputs)
     place = f"u = {np.round(u, 4)}" if worst.function == "sample" else pair_in_words(wo, wi)
-    values = f"{worst.read:.9g}, {worst.written:.9g} expected"
+    values = f"{worst.read:.9g} instead of {worst.written:.9g}"
     shown = [f"{path} = {np.round(rows[..., worst.row], 4)}" for path, rows in fields.items()]
     at = ", ".join(shown[:SHOWN]) + (", ..." if len(shown) > SHOWN else "")
     finding.worst = f"{language}, {worst.function}: {values}; {place}{'; ' if at else ''}{at}"
@@ -104,6 +104,6 @@ def languages(finding: Finding) -> list[str]:
     try:
         compiler()
     except GonioError as error:
-        finding.untried = f"GLSL and HLSL: {error.what}; {error.hint}. WGSL holds"
+        finding.untried = f"GLSL and HLSL: {error.what}; {error.hint}. The law holds for WGSL"
         return ["wgsl"]
     return list(read_back.LANGUAGES)

@@ -42,19 +42,19 @@ class Weight(Law):
         size, row, wi = figures[-1]
         exact = subject.best == "float64"
         if exact and figures[0][0] > SINGLE:
-            problems.append(f"float32: {figures[0][0]:.2e} where {SINGLE:.0e} is allowed")
+            problems.append(f"float32: {figures[0][0]:.2e}; at most {SINGLE:.0e} is allowed")
         finding = Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
-            reason="float64: both sides are the same formula, but for a few roundings"
+            reason="float64: both sides are the same formula and differ only by a few rounding errors"
             if exact
-            else "float32: beyond 8 roundings of wi, which narrow lobes magnify, the rest is the model's own sums",
+            else "float32, beyond a change of wi by 8 ulps: rounding errors of the model's own sums",
             worst=pair_in_words(wo[row], wi),
             at=(wo[row], wi),
             problems=problems,
         )
         if exact:
-            finding.notes.append(f"float32: {figures[0][0]:.2e}")
+            finding.notes.append(f"in float32: {figures[0][0]:.2e}")
         if subject.stochastic:
             return _expected(subject, finding, seed, effort)
         return finding
@@ -85,7 +85,10 @@ class Weight(Law):
                 )
             value = subject.eval(o, i, mode)
             if _gray(s.weight[rows]) and not _gray(value):
-                yield Cause("the weight is gray where eval has a color: a mean, or one channel of it?", "gray weight")
+                yield Cause(
+                    "the weight is gray but eval is colored: a mean over the channels, or a single channel?",
+                    "gray weight",
+                )
             clamped = _clamped(s.weight[rows], value / np.maximum(pdf, 1e-30), "eval / pdf")
             if clamped:
                 yield Cause(f"the weight is {clamped}", "clamped weight")
@@ -93,7 +96,7 @@ class Weight(Law):
             lit = (largest[0] > 0.0) & (largest[1] > 0.0)
             divisor = _clamped((largest[0] / np.where(lit, largest[1], 1.0))[lit[:, 0]], pdf[lit[:, 0]], "pdf")
             if divisor:
-                yield Cause(f"eval over the weight is {divisor}", "clamped weight")
+                yield Cause(f"eval divided by the weight is {divisor}", "clamped weight")
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
         for problem in finding.problems:
             _, _, convention = problem.partition(": ")
@@ -128,7 +131,7 @@ class Weight(Law):
                 only_delta = getattr(subject.model, "delta", "maybe") == "always"
                 shows = peak > (0.0 if only_delta else 1e-3 + 3.0 * next_to)
                 if np.any(shows & (only_delta | (peak < LOBE))):
-                    problems.append(f"{precision}: eval or pdf is positive at the direction of a delta sample")
+                    problems.append(f"{precision}: eval or pdf is positive in the direction of a delta sample")
             rows = np.flatnonzero(density)
             if subject.stochastic or not len(rows):
                 continue
@@ -215,11 +218,11 @@ def _conventions(s: object, inner: np.ndarray, problems: list[str], precision: P
     good = pdf > 0.0
     wrong = []
     if np.any(weight[~good & inner] != 0.0):
-        wrong.append("a failed sample (pdf 0) has a weight")
+        wrong.append("the weight of a failed sample (pdf = 0) is not 0")
     if np.any(np.abs(np.linalg.norm(wi[good], axis=1) - 1.0) > 1e-5):  # wo itself is rounded to float32
         wrong.append("a sampled direction is not a unit vector")
     if np.any(pdf[good & delta] > 1.0 + 1e-6):
-        wrong.append("the pdf of a delta sample, a probability, exceeds 1")
+        wrong.append("the pdf of a delta sample is a probability but exceeds 1")
     for what in wrong:
         if f"{precision}: {what}" not in problems:
             problems.append(f"{precision}: {what}")
@@ -242,7 +245,9 @@ def _expected(subject: Subject, finding: Finding, seed: int, effort: Effort) -> 
         return statistics.normal_two_sided(difference.mean() / noise) if noise > 0.0 else 1.0
 
     finding.tolerance = np.inf
-    finding.reason = "the model is stochastic: expectations are compared by p-values"
-    finding.shown = "expectations"
-    finding.trials.append(Trial(p_value(seed), "mean weight against mean eval / pdf", lambda: p_value(seed + 7919)))
+    finding.reason = "the material is stochastic: expectations are compared by p-values"
+    finding.shown = "expectations compared"
+    finding.trials.append(
+        Trial(p_value(seed), "mean weight compared with mean eval / pdf", lambda: p_value(seed + 7919))
+    )
     return finding
