@@ -30,6 +30,7 @@ from gonio.verify.verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Verdict
 FOLDER = Path(__file__).parent / "report-cards"
 PROGRAMS = FOLDER / "programs"
 MARKS = {PASS: "pass", FAIL: "**fails**", DECLARED: "declared", NOT_APPLICABLE: "-"}
+FURNACE = re.compile(r"(loss|gain) in a white furnace: (.*)")
 SHORT = [name for name, law in laws().items() if not law.on_request]
 
 # settings that the verifier would not try by itself, in addition to the defaults
@@ -93,10 +94,10 @@ def trials(target: str) -> list[Any]:
 
 
 def losses(report: Report) -> dict[str, str]:
-    """The loss of the white furnace, per setting."""
-    words = "loss in a white furnace: "
-    notes_of = {card.title: [n for n in card["energy"].notes if n.startswith(words)] for card in report.cards}
-    return {title: notes[0].removeprefix(words) for title, notes in notes_of.items() if notes}
+    """The loss or gain of the white furnace, per setting."""
+    notes_of = {card.title: [FURNACE.match(note) for note in card["energy"].notes] for card in report.cards}
+    first = {title: next(filter(None, matches), None) for title, matches in notes_of.items()}
+    return {title: f"{match[1]} of {match[2]}" for title, match in first.items() if match}
 
 
 def summary(report: Report, law: str) -> str:
@@ -302,12 +303,11 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
                 lines.append(f"| {setting} | {' | '.join(map(_number, texts))} |")
     lines += [
         "",
-        "## Loss in a white furnace",
+        "## White furnace",
         "",
-        "Every albedo is 1 and, if it can be chosen, F = 1. The table gives the average loss over a hemisphere and the",
-        "largest loss; a negative loss is a gain.",
+        "Every albedo is 1 and, if it can be chosen, F = 1. The table gives the average over a hemisphere and the extreme.",
         "",
-        "| target, setting | loss |",
+        "| target, setting | loss or gain |",
         "|---|---|",
     ]
     for _, result in ordered:
