@@ -51,12 +51,12 @@ def check(
     """The report of a material that satisfies its laws; otherwise the test fails with the report's text.
 
     target  a material, or the name of a target as `gonio verify` takes it
-    quick   whether to judge fewer samples
+    quick   whether to use fewer samples
     law     the name of one law or several; None for all
     breaks  names of laws that the material violates, or a mapping from these to the largest value allowed; the test
             also fails if one of them holds
     more    further keywords of `gonio.verify`: deep, seed, timeout, memory, isolated
-    A material that can be named, or sent to another process, is judged in that process, where it may crash.
+    A material that can be named, or sent to another process, is tested in that process, where it may crash.
     """
     __tracebackhide__ = True
     from .errors import InputError
@@ -80,13 +80,17 @@ def _complaints(report: Report, breaks: Mapping[str, float] | Collection[str]) -
     for verdict in report.failures:
         broken.add(verdict.law)
         if verdict.law not in breaks:
-            complaints.append(f"{verdict.law} is broken: {'; '.join(verdict.why)}")
+            complaints.append(f"{verdict.law} is violated: {'; '.join(verdict.why)}")
             continue
         most = breaks[verdict.law] if isinstance(breaks, Mapping) else None
         if most is not None and (verdict.figure is None or not abs(verdict.figure) <= most):
-            complaints.append(f"{verdict.law} is broken by {verdict.shown or 'no figure'}, and {most:g} is allowed")
+            complaints.append(
+                f"{verdict.law} is violated ({verdict.shown or 'no figure'}; at most {most:g} is allowed)"
+            )
     asked = {verdict.law for card in report.cards for verdict in card.verdicts}
-    complaints += [f"{name} is declared broken, but holds" for name in breaks if name in asked and name not in broken]
+    complaints += [
+        f"{name} is declared as violated, but holds" for name in breaks if name in asked and name not in broken
+    ]
     return complaints
 
 
@@ -107,7 +111,7 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 
 
 class Target(pytest.Collector):
-    """A target, judged once against all selected laws."""
+    """A target, tested once against all selected laws."""
 
     def __init__(self, *, target: str, **more: Any) -> None:
         super().__init__(**more)

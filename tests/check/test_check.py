@@ -240,7 +240,7 @@ def test_bad_rows_and_targets_are_refused_with_one_line(tmp_path: Path, capsys: 
     long = _rows(tmp_path / "long.csv", OrenNayar()(of.WO, of.WI))
     long.write_text(long.read_text().replace(long.read_text().splitlines()[1].split(",")[0], "7", 1))
     assert "a unit vector expected" in _error(capsys, str(long), "oren-nayar")
-    assert "no model to judge against" in _error(capsys, str(long))
+    assert "no model to compare with" in _error(capsys, str(long))
     assert "a PDF" in _error(capsys, str(tmp_path / "report.pdf"))
     assert "no file" in _error(capsys, str(tmp_path / "E.png"))
     (tmp_path / "empty").mkdir()

@@ -1,4 +1,4 @@
-"""Compare a class, or any other material, with a model: f at pairs of directions, judged like a file of values."""
+"""Compare a class, or any other material, with a model: f at pairs of directions, checked like a file of values."""
 
 from __future__ import annotations
 

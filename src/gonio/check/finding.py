@@ -24,16 +24,16 @@ class Mistake:
 
 @dataclass(frozen=True)
 class Finding:
-    """The judgment of one piece of work.
+    """The result for one piece of work.
 
     name     the file or class
-    kind     the kind of work that it was judged as: "table of E", "values of f", ...
-    status   RIGHT, WRONG, ERROR (it could not be judged), MISSING or BY_HAND
+    kind     the kind of work that it was recognized as: "table of E", "values of f", ...
+    status   RIGHT, WRONG, ERROR (it could not be checked), MISSING or BY_HAND
     facts    sentences that state what it was compared with, how large the difference is, and where
     mistake  the probable mistake, None if no formula fits
     figures  the numbers in `facts`
     hidden   whether formulas and values of the solution are left out
-    remark   the material that it was judged by, if the command does not name it completely; "" otherwise
+    remark   the material that it was compared with, if the command does not name it completely; "" otherwise
     """
 
     name: str
@@ -67,7 +67,7 @@ class Finding:
         return replace(self, facts=facts, figures={}, hidden=True)
 
     def lines(self) -> list[str]:
-        """The judgment as lines of text, one per fact."""
+        """The result as lines of text, one per fact."""
         lines = [f"{self.name}: {self.status}" + (f" ({self.kind})" if self.kind else "")]
         lines += [f"  {fact}" for fact in (*self.facts, self.remark) if fact]
         if self.cause:
@@ -91,5 +91,5 @@ class Finding:
 
 
 def unreadable(name: str, why: str, hint: str = "") -> Finding:
-    """The finding for work that cannot be judged, with the reason `why`."""
+    """The finding for work that cannot be checked, with the reason `why`."""
     return Finding(name, "", ERROR, (f"{why}: {hint}" if hint else why,))

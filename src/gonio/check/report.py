@@ -1,4 +1,4 @@
-"""The judgment of a folder: submissions, their tasks and suggested marks."""
+"""The results for a folder: submissions, their tasks and suggested marks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PARTIAL = 0.5  # fraction of the points for a result with a known mistake, since
 
 @dataclass(frozen=True)
 class Mark:
-    """A task, its points and its judgment."""
+    """A task, its points and its result."""
 
     task: str
     points: float
@@ -24,7 +24,7 @@ class Mark:
 
     @property
     def suggested(self) -> float | None:
-        """Suggested points; None if a person has to judge the work."""
+        """Suggested points; None if a person has to mark the work."""
         if self.finding.status in (BY_HAND, ERROR):
             return None
         if self.finding.status == RIGHT:
@@ -57,7 +57,7 @@ class Submission:
 
 @dataclass(frozen=True)
 class Report:
-    """The judgment of one submission or of a class."""
+    """The results for one submission or for a class."""
 
     submissions: Sequence[Submission]
     sheet: str
@@ -84,7 +84,7 @@ class Report:
         return replace(self, submissions=hidden)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """One row per file: submission, task, file, judgment, points, probable mistake."""
+        """One row per file: submission, task, file, result, points, probable mistake."""
         rows: list[tuple[str, ...]] = []
         for one in self.submissions:
             for mark in one.marks:
@@ -96,7 +96,7 @@ class Report:
                 rows.append((one.name, mark.task, finding.name, finding.status, points, why))
             total = sum(mark.points for mark in one.best().values())
             rows.append((one.name, "suggested", "", "", f"{one.points:g} / {total:g}", ""))
-            rows += [(one.name, "", name, "not judged", "", "not a file of a task") for name in one.others]
+            rows += [(one.name, "", name, "not checked", "", "not a file of a task") for name in one.others]
         return rows
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""`gonio check` and `go.check`: recognize the kind of work that was handed in and judge it."""
+"""`gonio check` and `go.check`: recognize the kind of work that was handed in and check it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .report import Mark, Report, Submission, junit
 
 @dataclass(frozen=True)
 class Work:
-    """The work to be judged, and the options of its judgment; the fields are arguments of `check`."""
+    """The work to be checked, and the options of the check; the fields are arguments of `check`."""
 
     target: str | Path | BSDF
     against: str | BSDF | None = None
@@ -56,12 +56,12 @@ class Work:
         return shader if shader != text and shaders.names_shader(shader) else text
 
     def model(self) -> BSDF:
-        """The material by which the work is judged. Raises InputError if none was given."""
+        """The material with which the work is compared. Raises InputError if none was given."""
         if isinstance(self.against, BSDF):
             return self.against
         if not self.against:
             raise InputError(
-                "no model to judge against", "MODEL", "such as: gonio check mine.py:Mine conductor -p alpha=0.3"
+                "no model to compare with", "MODEL", "such as: gonio check mine.py:Mine conductor -p alpha=0.3"
             )
         operands.kind_of(self.against, operands.MATERIALS, "MODEL")
         return notation.named(self.against)[0]
@@ -106,12 +106,14 @@ def _picture(work: Work) -> Finding:
 def _table(work: Work) -> Finding:
     if work.against is not None and not isinstance(work.against, str):
         raise InputError(
-            "a table of E cannot be judged by a material", "MODEL", "give a masking term, such as schlick-ibl, or none"
+            "a table of E cannot be compared with a material",
+            "MODEL",
+            "give a masking term, such as schlick-ibl, or none",
         )
     return tables.check(tables.read(work.path), work.against or "")
 
 
-# For each kind of work: whether a target is of that kind, and the function that judges it. The first match is used.
+# For each kind of work: whether a target is of that kind, and the function that checks it. The first match is used.
 JUDGES: tuple[tuple[Callable[[Work], bool], Callable[[Work], Finding]], ...] = (
     (lambda work: work.is_material, _class),
     (lambda work: work.suffix in sheet.ROWS, _rows),
@@ -140,8 +142,8 @@ def check(
 
     target     a table of E or E_avg (.png, .exr, .npz); rows of wo, wi and f (.csv, .txt); a material, FILE.py:CLASS; a
                shader (.glsl, .wgsl, ...); a picture, with `scene`; a folder of these or of such folders, with `sheet`
-    against    the material by which the work is judged, as a string or an object; for a table, the masking term that it
-               must have
+    against    the material with which the work is compared, as a string or an object; for a table, the masking term
+               that it must have
     scene      the scene that a picture shows; with `sheet`, a folder of scenes named like the pictures
     sheet      "hw4" or "lab2": the tasks and their points
     up         the axis along the normal in rows of directions: "z", "y" or "x"
@@ -149,7 +151,7 @@ def check(
     allow_outside, allow_code  permissions of scenes, as in `go.render`
     hide_solution  leave out formulas and values of the solution
     junit      path of a JUnit XML file for the verdicts
-    function   the function of a shader to judge, in place of the one that its adapter names
+    function   the function of a shader to check, in place of the one that its adapter names
     Returns a Finding, or a Report for a folder; both have `passed`, `exit_code` and `as_dict`.
     Raises InputError for work that cannot be read; in a folder, the error becomes a finding, and the other files are
     judged.
@@ -175,7 +177,7 @@ def _judge(work: Work, tasks: str | None) -> Finding | Report:
         raise InputError(f"'{work.target}' is not a folder", "--sheet", "give the folder of one or more submissions")
     judge = next((judge for accepts, judge in JUDGES if accepts(work)), None)
     if judge is None:
-        what = f"'{work.target}' is {'a PDF, which' if work.suffix == '.pdf' else 'of a kind that'} cannot be judged"
+        what = f"'{work.target}' is {'a PDF, which' if work.suffix == '.pdf' else 'of a kind that'} cannot be checked"
         raise InputError(
             what, "TARGET", "give a table (.png), rows of f (.csv), FILE.py:CLASS, a shader, or a folder with --sheet"
         )

@@ -30,7 +30,7 @@ def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None
     If no parameters are given, any parameters that explain the values are accepted, unless a known mistake explains
     them with the defaults.
 
-    asked     the material to judge by
+    asked     the material to compare with
     up        the axis along the normal: "z", "y" or "x"
     accuracy  relative difference that counts as equal; None: the default
     """

@@ -1,4 +1,4 @@
-"""The assignment sheets of the courses, as tasks with points, and the judgment of submissions.
+"""The assignment sheets of the courses, as tasks with points, and the results for submissions.
 
 A file belongs to the first task whose pattern its name matches. A file of values may name its parameters and its frame
 in comments, `# model: oren-nayar(sigma=0.5)` and `# up: y`; the task prescribes the model and its terms. Code is not
@@ -168,12 +168,12 @@ def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, 
         return _values(task, path, up)
     if suffix in PICTURES and scene is not None:
         return pictures.check(path, scene)
-    note = "code is not run from a folder: gonio check FILE.py:CLASS MODEL judges it" if suffix == ".py" else ""
+    note = "code is not run from a folder: use gonio check FILE.py:CLASS MODEL" if suffix == ".py" else ""
     return Finding(path.name, "", BY_HAND, (note,) if note else ())
 
 
 def _values(task: Task, path: Path, up: str) -> Finding:
-    """The finding for values of f, judged by the task's model with the parameters that the file names."""
+    """The finding for values of f, compared with the task's model with the parameters that the file names."""
     up = stated.comments(path).get("up", up)
     try:
         asked = stated.for_task(path, (task.model, *task.forms))

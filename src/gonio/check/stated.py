@@ -1,11 +1,11 @@
-"""The model by which values of f are judged: the requested one, with the parameters that the file itself names.
+"""The model with which values of f are compared: the requested one, with the parameters that the file itself names.
 
     # model: oren-nayar(sigma=0.5)      a comment in the file
     # up: y
 
 On the command line, the user's settings take precedence over this line. In a folder, the sheet prescribes the model and
 its terms (distribution, masking, kind of Fresnel term), and the line gives only numbers: a file must not choose the
-model by which it is judged.
+model with which it is compared.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _EDGE = "edge"  # a parameter of `metal` that, unlike other numbers, changes the
 
 @dataclass(frozen=True)
 class Asked:
-    """The material by which values are judged.
+    """The material with which values are compared.
 
     remark    a statement of the source of its parameters; "" if the user named it completely
     defaults  whether neither the user nor the file named parameters, so that the values may have other ones
@@ -70,8 +70,10 @@ def for_command(path: Path, against: str | BSDF | None) -> Asked:
     if not against:
         if not text:
             hint = "such as: gonio check f.csv oren-nayar -p sigma=0.3, or a line '# model: oren-nayar(sigma=0.3)'"
-            raise InputError("no model to judge against", "MODEL", hint)
-        return Asked(notation.made(*_line(text, path.name))[0], f"judged by the file's line: {text}")
+            raise InputError("no model to compare with", "MODEL", hint)
+        return Asked(
+            notation.made(*_line(text, path.name))[0], f"compared with the material in the file's line: {text}"
+        )
     operands.kind_of(against, operands.MATERIALS, "MODEL")
     cls, own = notation.taken_apart(against)
     line: Line | None = None
@@ -179,4 +181,4 @@ def _with_defaults(material: BSDF, own: Mapping[str, object]) -> Asked:
     name = type(material).name
     values = ", ".join(f"{key}={notation.written(value)}" for key, value in numbers.items())
     line = f"# model: {name}({next(iter(numbers))}=...)"
-    return Asked(material, f"judged with {values}; a line '{line}' in the file, or -p, names others", True)
+    return Asked(material, f"compared with {values}; a line '{line}' in the file, or -p, names others", True)

@@ -81,7 +81,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Exit codes: 0 success, 1 failed verdict, 2 bad usage or input, 3 machine fault, 130 Ctrl-C.",
+    epilog="Exit codes: 0 success, 1 failed verdict, 2 bad usage or input, 3 machine fault, 4 invisible violations "
+    "only, 130 Ctrl-C.",
 )
 
 

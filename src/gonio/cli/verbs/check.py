@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Judging(Options):
-    """Options of the judgment and of its report."""
+    """Options of the check and of its report."""
 
     scene: Annotated[
         Path | None, Option(metavar="FILE", help="Scene that the picture shows; with --sheet, a folder of scenes.")
@@ -125,13 +125,13 @@ def _write_reference(folder: Path, material: str | None, made: Material, as_json
 def _with_parameters(
     target: str | None, model: str | None, against: str | None, made: Material
 ) -> tuple[str, str | None]:
-    """The work, and the material or masking term by which it is judged. Each of the given parameters is set on the
-    materials that have it."""
+    """The work, and the material or masking term against which it is checked. Each of the given parameters is set on
+    the materials that have it."""
     from ...catalog import outside, shaders
     from ...optics.masking import Masking
 
     if target is None:
-        raise InputError("nothing to judge", "WORK", "such as: gonio check E.png")
+        raise InputError("no work to check", "WORK", "such as: gonio check E.png")
     if model is not None and against is not None:
         raise InputError(f"both '{model}' and --against given", "--against", "name the model once")
     model = against if model is None else model
@@ -146,7 +146,7 @@ def _with_parameters(
 
 def _print_table(report: Report) -> None:
     """Print one row per file, and the suggested points of each submission."""
-    table = listing("submission", "task", "file", "judgment", "points", "probable mistake")
+    table = listing("submission", "task", "file", "result", "points", "probable mistake")
     for row in report.rows():
         table.add_row(*row)
     print_rich(table)
