@@ -122,7 +122,7 @@ def _settings(why: list[str]) -> list[tuple[str, str]]:
 def _size(v: Verdict) -> str:
     if v.bias is not None and v.bias.kind in ("bias", "lost", "gained"):
         verb = {"bias": "wrong by", "lost": "loses", "gained": "gains"}[v.bias.kind]
-        return f"{verb} {percent(v.bias.average)} of the light on average, {percent(v.bias.worst)} at worst"
+        return f"{verb} {percent(v.bias.average)} of the reflected light on average, {percent(v.bias.worst)} at worst"
     return v.shown if v.bias is None else v.bias.words
 
 

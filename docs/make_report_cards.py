@@ -48,28 +48,39 @@ ORDER = [
 
 # issues and pull requests in Mitsuba's repositories about the failure or a related one
 UPSTREAM = {
-    ("principled", "calls"): "mitsuba3 #1951 (merged 2026-09-07, in no version yet) names the component numbers",
-    ("principledthin", "calls"): "mitsuba3 #1951 (merged 2026-09-07, in no version yet) names the component numbers",
+    (
+        "principled",
+        "calls",
+    ): "mitsuba3 #1951 (merged 2026-09-07, not yet released) introduces named constants for the components",
+    (
+        "principledthin",
+        "calls",
+    ): "mitsuba3 #1951 (merged 2026-09-07, not yet released) introduces named constants for the components",
     ("principled", "energy"): "mitsuba3 #465 (closed) is about the energy that its transmission loses",
     ("blendbsdf", "calls"): "mitsuba2 #151 (open): the component is always 0",
     ("blendbsdf", "positivity"): "mitsuba3 #1681 (merged 2025) fixed its pdf and null lobes",
     ("roughplastic", "positivity"): "mitsuba2 #32 (open): NaN where the cosine is 0",
     ("roughplastic", "energy"): "mitsuba3 #1155 (closed) is about the energy that it loses when rough",
-    ("hair", "pdf"): "mitsuba3 #871 (merged 2023): its own chi-square test covers few parameters",
+    ("hair", "pdf"): "mitsuba3 #871 (merged 2023): Mitsuba's own chi-square test of hair covers few parameters",
 }
 
 EXPLANATION = """
-- *pass*: the law holds within its tolerance, at the given values and at those listed on the page; *declared*: the
-  model declares that it violates the law, and by how much; **fails**, with the grade: *invisible* (under 0.1 % of the
-  reflected light on average and under 1 % at worst), *small* (1 %, 10 %), *visible* (10 %, 50 %), *broken*; *NaN*;
-  *noise* (wastes samples without bias); *interface* (calls that plain path tracers do not make); *inner* (a material
-  inside it fails; with a correct one the law holds); *by nature* (the law does not apply to this kind of plugin).
-- *-*: the law does not apply; the page gives the reason. Mitsuba's plugins are float32, with wider tolerances, and have
-  no 64-bit variant for `gradients` and `precision`.
+- *pass*: the law holds within its tolerance, at the given parameter values and at the others listed on the material's
+  card. *declared*: the model declares that it violates the law, and by how much. *-*: the law does not apply; the card
+  gives the reason.
+- A failure is shown by its grade. Four grades state the error of the reflected light: *invisible* (less than 0.1 % on
+  average and 1 % at worst), *small* (1 %, 10 %), *visible* (10 %, 50 %) and *broken* (more). The others state its kind:
+  *NaN* (values that are not finite), *noise* (samples are wasted, without bias), *interface* (the failure occurs only
+  in calls that a plain path tracer does not make), *inner* (the failure is that of a nested material; with a correct
+  one, the law holds) and *by nature* (no BSDF of this kind can obey the law).
+- Mitsuba's plugins are evaluated in float32, and tested with wider tolerances. `gradients` and `precision` need a
+  64-bit reference, so they are not tested.
 - A sample of weight 0 counts as failed, as in Mitsuba's own chi-square test.
-- Composed BSDFs are tested with simple ones inside: blendbsdf = diffuse + roughconductor, mask, bumpmap and normalmap
-  over diffuse, twosided over roughconductor. bumpmap is a uniform slope: a tilted normal is by nature neither
-  isotropic nor reciprocal about the geometric one. hair is defined about a fiber, not about a surface normal.
+- Composite BSDFs are tested with simple nested materials: `blendbsdf` blends `diffuse` and `roughconductor`; `mask`,
+  `bumpmap` and `normalmap` contain `diffuse`; `twosided` contains `roughconductor`. `bumpmap` is tested on a uniform
+  slope: a BSDF with a tilted shading normal is neither isotropic nor reciprocal with respect to the geometric normal.
+  `hair` is defined relative to a fiber, not to a surface normal.
+- Directions are given as theta, phi in degrees.
 - Mitsuba's microfacet plugins use Beckmann's distribution by default; GGX is tested too.
 """
 
@@ -160,13 +171,19 @@ def page(target: str, report: Report) -> str:
     lines = [
         f"# {target}",
         "",
-        f"These are the results of `gonio verify` ({made}Gonio {go.__version__}, {datetime.date.today()}, effort "
-        f"{report.effort}, seed {report.seed}), with {report.tests} statistical tests at significance "
-        f"{report.threshold:.1e} each (0.01 overall, Sidak correction). A rejection counts only if a second seed "
+        f"These are the results of `gonio verify` ({made}Gonio {go.__version__}, {datetime.date.today()}, "
+        f"{report.effort} effort, seed {report.seed}), with {report.tests} statistical tests, each at a significance "
+        f"level of {report.threshold:.1e} (0.01 overall, Sidak correction). A rejection counts only if a second seed "
         "confirms it.",
     ]
     for card in report.cards:
-        lines += ["", f"## {card.title}", "", "| law | verdict | figure | allowed | remark |", "|---|---|---|---|---|"]
+        lines += [
+            "",
+            f"## {card.title}",
+            "",
+            "| law | verdict | measured | allowed | remark |",
+            "|---|---|---|---|---|",
+        ]
         for v in card.verdicts:
             allowed = "" if v.tolerance is None or v.tolerance == float("inf") else f"{v.tolerance:.0e}"
             grade = f": {v.grade}" if v.failed and v.grade else ""
@@ -187,7 +204,7 @@ def page(target: str, report: Report) -> str:
 def _remark(v: Verdict) -> str:
     if v.status == NOT_APPLICABLE:
         return _clean("; ".join(v.why))
-    return _clean("; ".join([*v.notes, *([f"worst case ({v.worst})"] if v.worst else [])]))
+    return _clean("; ".join([*v.notes, *([f"worst case: {v.worst.replace(': ', ', ', 1)}"] if v.worst else [])]))
 
 
 def _number(text: str) -> str:
@@ -253,16 +270,16 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
     lines = [
         "# Report cards",
         "",
-        f"These are the results of `gonio verify` for {renderers}, effort {effort}, seed {seed}.",
+        f"These are the results of `gonio verify` for {renderers}, {effort} effort, seed {seed}.",
         "The page is generated by `python docs/make_report_cards.py`. A cell gives the worst verdict over all settings",
-        "of a target. The shaders of engines have [cards of their own](engines/README.md).",
+        "of a target. The shaders of engines have [their own cards](engines/README.md).",
         "",
         *EXPLANATION.strip().splitlines(),
         "",
         "## Failures, worst first",
         "",
-        "Percentages refer to the reflected light. A program needs only Mitsuba; while the fault exists, it ends with",
-        "an AssertionError that states the measured value.",
+        "Percentages refer to the reflected light. Each program needs only Mitsuba; while the fault exists, it ends",
+        "with an AssertionError that states the measured value.",
         "",
         "| grade | BSDF | law | effect | probable cause | known upstream | program |",
         "|---|---|---|---|---|---|---|",

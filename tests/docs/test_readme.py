@@ -269,7 +269,11 @@ def test_it_is_short(name: str) -> None:
     ("figure", "page", "sentence"),
     [
         ("52 %", "docs/report-cards/README.md", "[principledthin](mitsuba-principledthin.md) | reciprocity | wrong by"),
-        ("37 %", "docs/report-cards/README.md", "int pdf exceeds the fraction of valid samples by 37 %"),
+        (
+            "37 %",
+            "docs/report-cards/README.md",
+            "the integral of the pdf exceeds the fraction of valid samples by 37 %",
+        ),
         ("2.8", "docs/published-fits.md", "| white-paint | `bagher2012/sgd` | 2.8 at 89.5"),
         ("1.4e-7", "docs/energy.md", "| GGX, Smith (all) | 1.4e-7 |"),
         ("0.027", "docs/energy.md", "error is 0.027"),

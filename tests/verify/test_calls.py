@@ -87,7 +87,7 @@ def test_a_plugin_in_a_file_is_judged_by_what_path_tracers_call(tmp_path: Path) 
         (tmp_path / f"{name}.py").write_text(PLUGIN.replace("NAME", name).replace("FACTOR", factor))
     assert verify(f"{tmp_path}/calls_sound.py:calls_sound", quick=True).passed
     verdict = verify(f"{tmp_path}/calls_wrong.py:calls_wrong", quick=True, law="calls")["calls"]
-    assert verdict.failed and "eval_pdf's value is not eval: 2 times as large" in verdict.why[0]
+    assert verdict.failed and "eval_pdf's value differs from eval: it is 2 times as large" in verdict.why[0]
     assert verdict.grade == "broken" and "2" in verdict.cause
 
 

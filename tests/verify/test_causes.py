@@ -170,7 +170,7 @@ class EncodedUnderVarnish(RightDiffuse):
         (TwoPiCosine, "weight", "is 2 pi cos_i, within"),
         (Green, "weight", "is 1 / 2, only in green, within"),
         (Behind, "weight", "is 1 / 2, where wi.x < 0, within"),
-        (BeyondSixty, "weight", "is 2 (o.m), where wo's angle to the normal is beyond 60."),
+        (BeyondSixty, "weight", "is 2 (o.m), where wo's angle to the normal is more than 60."),
         (AlphaSquaredAgain, "weight", "D(alpha) / D(alpha^2) of GGX"),
         (FresnelAtTheNormalInSample, "weight", "F(n.o) / F(o.m)"),
         (OtherPdf, "weight", "the pdf of samples to pdf(wo, wi) is 1 / (4 (o.m)), within"),
@@ -180,7 +180,7 @@ class EncodedUnderVarnish(RightDiffuse):
         (OneSidedCoupling, "reciprocity", "g(wo) / g(wi)"),
         (WrongScaling, "reciprocity", "eta^4 in transmission"),
         (OnePercentMore, "energy", "the albedo is 1.01 for every wo"),
-        (MoreAtGrazing, "energy", "1.02 where wo's angle to the normal is beyond"),
+        (MoreAtGrazing, "energy", "1.02 where wo's angle to the normal is more than"),
         (BlueGains, "energy", "blue is 1.2 times the other channels"),
         (AlbedoSquared, "linearity", "albedo^2"),
         (EncodedUnderVarnish, "linearity", "albedo^2.2, within"),
@@ -275,7 +275,7 @@ def test_light_that_no_sample_finds_is_placed() -> None:
 @pytest.mark.slow
 def test_a_cascade_names_its_first_cause_once() -> None:
     report = verify(NoJacobianInSample(), quick=True, law=["energy", "weight"])
-    assert "(o.m)" in report["weight"].cause and report["energy"].cause == "follows from the failure of weight"
+    assert "(o.m)" in report["weight"].cause and report["energy"].cause == "follows from the failure of the law weight"
     text = str(report)
     assert text.index("weight: ") < text.index("energy: directional")
 
@@ -430,7 +430,7 @@ LAST: list[tuple[str, str, str]] = [
     ("w2_plugins_a.W2PluginFrosted", "pdf", "samples are drawn from visible normals"),
     ("w3_engines.W3HalfFloat", "pdf", "rounded to 11 bits"),
     ("w1_corners.W1FlooredPdf", "weight", "clamped to at least 0.1"),
-    ("w4_metals.W4Iron", "pdf", "no sample fails, but int pdf is less than 1"),
+    ("w4_metals.W4Iron", "pdf", "no sample fails, but the integral of the pdf is less than 1"),
     ("w5_sheets.W5FreeFilm", "energy", "1 - the mean reflectance of the channels"),
     ("w5_sheets.W5Pane", "energy", "that of both faces of a pane"),
     ("w5_plugins.W5MiTile", "energy", "for wo below the surface, no sample carries light"),

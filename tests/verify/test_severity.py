@@ -141,7 +141,10 @@ def test_mass_of_the_pdf_where_no_sample_falls_is_noise() -> None:
     from gonio.verify.verdict import Finding
 
     told = Pdf().bias(of(PdfBelow()), Finding(0.1, 1e-3, ""), None, 1)  # type: ignore[arg-type]
-    assert told.grade is Grade.NOISE and "int pdf exceeds the fraction of valid samples by 10 %" in told.words
+    assert (
+        told.grade is Grade.NOISE
+        and "the integral of the pdf exceeds the fraction of valid samples by 10 %" in told.words
+    )
 
 
 def test_nan_is_a_grade_of_its_own() -> None:
@@ -174,7 +177,7 @@ def test_the_report_holds_grades_and_a_sound_one_none() -> None:
     assert weight["grade"] == "visible" and weight["bias"]["kind"] == "lost" and weight["cause"]
     assert all(v["grade"] is None and v["bias"] is None and v["cause"] == "" for v in right["verdicts"])
     text = str(report)
-    assert "FAIL visible" in text and "effect" in text and "follows from the failure of weight" in text
+    assert "FAIL visible" in text and "effect" in text and "follows from the failure of the law weight" in text
 
 
 @pytest.mark.slow

@@ -50,16 +50,16 @@ def test_fresnels_figures_differ() -> None:
 
 
 def test_a_limit_has_the_unit_of_the_figure() -> None:
-    finding = Finding(1.835, 1e-3, "", shown="int pdf = 2.835, wo at 0, 0 degrees", allowed="1.001")
+    finding = Finding(1.835, 1e-3, "", shown="integral of the pdf = 2.835, wo at 0, 0 degrees", allowed="1.001")
     verdict = decide(Pdf(), of(go.Lambert()), finding, 1e-4, 1)
-    assert verdict.why == ["int pdf = 2.835, wo at 0, 0 degrees; at most 1.001 is allowed"]
+    assert verdict.why == ["integral of the pdf = 2.835, wo at 0, 0 degrees; at most 1.001 is allowed"]
 
 
 def test_an_exception_that_several_laws_meet_is_reported_once() -> None:
     report = verify(of(OneRow()), quick=True, law=["reciprocity", "isotropy", "linearity"])
     failed = [verdict for verdict in report.cards[0].verdicts if verdict.failed]
     assert len(failed) == 3 and all("eval returned shape" in verdict.why[0] for verdict in failed)
-    assert [verdict.cause for verdict in failed] == ["", *["follows from the failure of reciprocity"] * 2]
+    assert [verdict.cause for verdict in failed] == ["", *["follows from the failure of the law reciprocity"] * 2]
     assert str(report).count("eval returned shape") == 1
 
 

@@ -357,7 +357,7 @@ class _Trial:
             self.difference = _Difference(name, other, got, expected, _rows(self.wo), _rows(self.si.wi))
         ratio = got[wrong].sum() / max(expected[wrong].sum(), 1e-30)
         part = f"in {wrong.mean():.1%} of the pairs"
-        return f"{name} is not {other}: {ratio:.4g} times as large where they differ, {part}"
+        return f"{name} differs from {other}: it is {ratio:.4g} times as large, {part}"
 
 
 def _is_delta(bs: BSDFSample) -> np.ndarray:

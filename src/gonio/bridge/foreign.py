@@ -198,7 +198,7 @@ _NESTS: dict[str, PluginDict] = {
 # section 5.3). For this reason, Mitsuba's manual calls these two plugins an approximation.
 _TILTED_FRAME = {
     "isotropy": "its shading normal is tilted to one side and rotates with the surface",
-    "reciprocity": "the cosine of wi refers to a normal other than the surface's (Veach1997, section 5.3)",
+    "reciprocity": "the cosine of wi is not taken with respect to the surface normal (Veach1997, section 5.3)",
     "energy": "light that the tilted frame reflects below the surface is cut off in one direction only",
 }
 _BY_NATURE: dict[str, dict[str, str]] = {

@@ -196,7 +196,7 @@ def _listed(words: list[str], last: str = " and ") -> str:
 
 
 # singular and plural, in the order of a sentence
-_NAMES = {"choice": ("other choice", "other choices"), "color": ("set of colors", "sets of colors")}
+_NAMES = {"choice": ("other option", "other options"), "color": ("set of colors", "sets of colors")}
 _NAMES |= {"pair": ("pair of unequal widths", "pairs of unequal widths"), "corner": ("corner", "corners")}
 _NAMES |= {"edge": ("edge", "edges"), "interior": ("interior point", "interior points")}
 _NAMES |= {"jump": ("point at a discontinuity", "points at discontinuities")}

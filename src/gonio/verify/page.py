@@ -77,8 +77,8 @@ def page(report: Report) -> str:
         word = f"{word if broken else 'No law is violated'}; not tried: {', '.join(report.untried)}"
         kind = kind if broken else "declared"
     tests = (
-        f"{report.tests} statistical tests at significance {report.threshold:.2e} each (0.01 overall, Sidak "
-        "correction); a rejection counts only if a second seed confirms it."
+        f"{report.tests} statistical tests, each at a significance level of {report.threshold:.2e} (0.01 overall, "
+        "Sidak correction); a rejection counts only if a second seed confirms it."
         if report.tests
         else "No statistical tests."
     )

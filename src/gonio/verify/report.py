@@ -112,7 +112,7 @@ class Report:
             word = f"[bold red]{len(self.unread)} not read[/], {word}"
         if self.untried:
             word = " ".join(filter(None, [word, f"[bold yellow]{' and '.join(self.untried)} NOT TRIED[/]"]))
-        tests = f"{self.tests} statistical tests at significance {self.threshold:.1e} each (0.01 overall)"
+        tests = f"{self.tests} statistical tests, each at a significance level of {self.threshold:.1e} (0.01 overall)"
         asked = tests if self.tests else "no statistical tests"
         console.print(f"{word}  [dim]{self.effort}, seed {self.seed}, {asked}, {self.seconds:.1f} s[/]")
 

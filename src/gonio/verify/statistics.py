@@ -38,7 +38,7 @@ def normal_two_sided(z: float) -> float:
 
 
 def binomial_two_sided(count: int, trials: int, probability: float) -> float:
-    """The probability of a count at least as far from its expectation on either side, as twice the smaller tail.
+    """The two-sided p-value of a binomial count: twice the probability of the smaller tail, at most 1.
 
     trials       number of trials
     probability  probability of success in each trial
@@ -121,9 +121,9 @@ LAYERS = 4  # maximum number of times that light passes a layer
 
 
 def is_dimmed(rows: np.ndarray, noise: float) -> bool:
-    """Whether values are a + b r + sum c_k (1 - r)^k for a reflectance r, with a + b r and all c_k >= 0, as for the
-    light of a layer plus light from below that passes the layer several times. A color that is multiplied twice, r^2,
-    has a < 0.
+    """Whether values are a + b r + sum c_k (1 - r)^k for a reflectance r, with a + b r and all c_k >= 0, as for
+    light that a layer reflects, plus light from below that passes through the layer several times. A color that is
+    applied twice by mistake gives r^2, for which a < 0.
 
     rows   values at the reflectances STEPS, (7, N)
     noise  relative noise of the values

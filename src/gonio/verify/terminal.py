@@ -32,7 +32,14 @@ def show_card(card: Card, console: Console) -> None:
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD, pad_edge=False, title=f"[bold]{escape(card.title)}[/]", title_justify="left")
-    for heading, style in (("", "dim"), ("law", "cyan"), ("verdict", ""), ("figure", ""), ("allowed", ""), ("", "dim")):
+    for heading, style in (
+        ("", "dim"),
+        ("law", "cyan"),
+        ("verdict", ""),
+        ("measured", ""),
+        ("allowed", ""),
+        ("", "dim"),
+    ):
         table.add_column(heading, style=style, no_wrap=heading in ("law", "verdict", "allowed"))
     for v in card.verdicts:
         table.add_row(str(v.number), v.law, _mark(v), escape(_figure(v)), _allowed(v), escape(_remark(v)))

@@ -185,10 +185,10 @@ def _places(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> Iterator[tuple[s
         lowest, highest = values[bad].min(), values[bad].max()
         if highest > values[~bad].max():
             edge = np.quantile(values[bad], 0.002, method="lower")
-            yield f"where {name} is beyond {edge:.3g} degrees", values >= edge
+            yield f"where {name} is more than {edge:.3g} degrees", values >= edge
         elif lowest < values[~bad].min():
             edge = np.quantile(values[bad], 0.998, method="higher")
-            yield f"where {name} is within {edge:.3g} degrees", values <= edge
+            yield f"where {name} is less than {edge:.3g} degrees", values <= edge
 
 
 def _angles(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

@@ -138,7 +138,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         result = formula if plain else text if formula == "1" else f"{text} times {formula}"
         if text.startswith("1 / ") and formula.startswith("1 / "):
             result = f"1 / ({text[4:]} {formula[4:]})"
-        agree = f"{OVER} {result}, within {max(left, 1e-3):.0e}, both in the cells and in int pdf for all wo"
+        agree = f"{OVER} {result}, within {max(left, 1e-3):.0e}, in the cells and in the integral of the pdf for all wo"
         return Cause(f"{agree}: {guess}?", f"samples {result}")
     return _sides(held)
 
@@ -151,7 +151,7 @@ def _number_of_wo(subject: Subject, held: Blocks, scale: float) -> Cause:
     s = subject.sample(np.broadcast_to(held.wo, (DRAWN, 3)), u)
     failed, lacking = float(np.mean(~(s.pdf > 0.0))), 1.0 - float(held.expected.sum()) / held.drawn
     if failed > max(lacking, 0.0) + LOST and not s.delta.any():
-        share = f"{failed:.0%} of the samples fail, but int pdf is only {max(lacking, 0.0):.0%} below 1"
+        share = f"{failed:.0%} of the samples fail, but the integral of the pdf is only {max(lacking, 0.0):.0%} below 1"
         guess = "are normals that face away from wo sampled, or directions below the horizon"
         return Cause(f"{agree}: {share}: {guess}?", "samples that fail")
     return Cause(f"{agree}: a wrong probability of choosing a lobe?", "samples a number of wo")
@@ -234,4 +234,4 @@ def unsampled(subject: Subject) -> str:
     if excess[row] < 1e-3:
         return ""
     share = severity.percent(float(excess[row]))
-    return f"int pdf exceeds the fraction of valid samples by {share}, wo at {severity.degrees(theta)}"
+    return f"the integral of the pdf exceeds the fraction of valid samples by {share}, wo at {severity.degrees(theta)}"

@@ -68,8 +68,8 @@ class Calls(Law):
                 name, other, wo, wi, got, all_rows = answer.rows
                 yield Ratio(name, other, wo, wi, got, all_rows, subject)
         for answer in wrong:
-            words = SUSPECTS.get(answer.what, f"{answer.what} (not the formula): {answer.wrong}")
-            if answer.what == "declared facts":
+            words = SUSPECTS.get(answer.what, f"not the formula, but {answer.what}: {answer.wrong}")
+            if answer.what == "declared properties":
                 guess = next((guess for start, guess in FACTS.items() if answer.wrong.startswith(start)), "")
                 words = f"{answer.wrong}: {guess}?" if guess else answer.wrong
             yield Cause(words, f"calls {answer.what}")
@@ -86,7 +86,7 @@ SUSPECTS = {
     "textured parameters": "the value of one ray is used for other rays: is it derived only once for all of them?",
     "a new object": "a call changes the results of later calls: state stored in the object?",
 }
-# the mistake of the formula or of the declaration, by the first words of the difference from the declared facts
+# the mistake of the formula or of the declaration, by the first words of the difference from the declared properties
 FACTS = {
     "light is transmitted": "a missing test of the side, or an absolute value; if intended, declare it",
     "light is reflected from below": "a missing test of the side, or an absolute value; if intended, declare it",
@@ -101,9 +101,9 @@ def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Answer]:
     for precision in subject.precisions:
         yield from _batches(subject, wo, wi, u, precision)
     if not subject.stochastic:
-        yield Answer("mode", _mode(subject, wo, wi) if subject.transmits else _one_mode(subject, wo, wi, u))
+        yield Answer("transport mode", _mode(subject, wo, wi) if subject.transmits else _one_mode(subject, wo, wi, u))
     yield from _textured(subject, wo, wi, u)
-    yield Answer("declared facts", _facts(subject, wo, wi, u))
+    yield Answer("declared properties", _facts(subject, wo, wi, u))
 
 
 def _answers(
@@ -296,7 +296,7 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Check that declared facts agree with the results: `transmits`, `two_sided`, `back_differs`, `delta`, and eta of
+    """Check whether results have the declared properties: `transmits`, `two_sided`, `back_differs`, `delta`, and eta of
     samples."""
     model = subject.model
     # all pairs of sides, even those without declared values

@@ -176,7 +176,7 @@ class Energy(Law):
         # a sharp edge, not a gradual rise
         if place and np.abs(a[bad] - 1.0).min() > 0.1 * np.abs(a[bad] - 1.0).max():
             words = f"{place.replace('from wi', 'from wo')}"
-            yield Cause(f"the albedo is 1, but {np.median(a[bad]):.4g} {words}", words)
+            yield Cause(f"the albedo is {np.median(a[bad]):.4g} instead of 1 {words}", words)
 
     def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
         """Check that the closed form of a material's albedo equals the integral of `eval`."""

@@ -57,7 +57,7 @@ class Pdf(Law):
         finding = Finding(
             figure=0.0,
             tolerance=EXCESS,
-            reason="int pdf is accurate to 1e-4; failed samples can only make it less than 1",
+            reason="the integral of the pdf is accurate to 1e-4; failed samples can only make it less than 1",
             allowed=f"{1.0 + EXCESS:g}",
         )
         lowest, misplaced, largest = 2.0, 0.0, ""
@@ -79,12 +79,12 @@ class Pdf(Law):
                     claimed = float(e.sum()) / cells.drawn
                     if claimed > EXCESS and not o.any():
                         word = "above" if side > 0 else "below"
-                        text = f"{UNUSED} {claimed:.2g} {word} the surface, where no sample occurs; {where}"
+                        text = f"{UNUSED} {claimed:.2g} {word} the surface, where no samples are generated; {where}"
                         finding.notes[:] = finding.notes or [text]
                 excess = max(tested.total - tested.error - 1.0, 0.0)
                 if excess > finding.figure:
                     finding.figure = excess
-                    largest = f"int pdf = {tested.total:.4g} for {where}"
+                    largest = f"integral of the pdf = {tested.total:.4g} for {where}"
         finding.shown = (
             "delta lobes only" if lowest > 1.0 else f"lowest of {len(finding.trials)} p-values: {lowest:.2g}"
         )
@@ -140,7 +140,7 @@ class Pdf(Law):
                 )
         for note in finding.notes:
             if note.startswith(UNUSED):
-                yield Cause(note, "pdf where no sample occurs")
+                yield Cause(note, "pdf where no samples are generated")
 
 
 UNUSED = "the pdf integrates to"  # begins the note about a side that is never sampled
@@ -161,7 +161,7 @@ def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[C
     near = _chi_square(subject, FEW, seed, directions.single(directions.at(np.array([ABOVE[1][0]]), ABOVE[1][1])))
     if near and 1.0 - near[0].total < STEEP * lacking[-1]:
         shares = ", ".join(f"{share:.2g} at {angles(one.wo)}" for share, one in zip(lacking, above, strict=True))
-        words = f"no sample fails, but int pdf is less than 1, by {shares} degrees of wo"
+        words = f"no sample fails, but the integral of the pdf is less than 1, by {shares} degrees of wo"
         guess = "directions below the horizon that are mirrored or clamped instead of failing"
         yield Cause(f"{words}: {guess}?", "samples from below")
 
@@ -266,7 +266,7 @@ def _misses_the_middle(wo: np.ndarray, wi: np.ndarray, fine: np.ndarray) -> bool
 _KINDS = {
     "fine": "chi-square test",
     "coarse": "chi-square test in coarse cells",
-    "others": "samples outside all cells compared with 1 - int pdf",
+    "others": "samples outside all cells compared with 1 - (integral of the pdf)",
 }
 
 
