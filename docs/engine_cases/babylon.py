@@ -13,8 +13,8 @@ INTRO = """This card tests PBRMaterial of the WebGL engine under directional lig
 program, `Shaders/pbr.fragment.js`, for a flat surface without texture maps, with the defines that the class sets.
 `babylon-standard` has the defaults of `new PBRMaterial`; `babylon-conserving` has
 `brdf.useLegacySpecularEnergyConservation = false`. Light from an environment map follows a different code path and is
-not tested here. The albedo of white metal is within 1% of 1 at all roughnesses and angles, which is the best result of
-the engines tested here."""
+not tested here. The albedo of white metal is within 1% of 1 at all roughnesses and angles, which is the best result
+among all engines with a report card."""
 
 _LOW = 0.1  # cosine of view and light for the diffuse lobe at grazing angles
 
@@ -120,7 +120,7 @@ Without legacy conservation, `lightFragment` multiplies `info.diffuse` by 1 minu
 whereas the specular lobe uses F at `preInfo.VdotH`. The angle of incidence on a facet is the angle between v and h.
 With n.h, the formula (1 - F) / pi gives the shader's diffuse lobe within {last["own_off"]:.0e} for 2,000 random pairs;
 with v.h, the two differ by up to {last["meant_off"]:.2f}. The table gives the diffuse lobe of a white dielectric seen
-at n.v 0.1, in units of a white Lambertian surface:
+at n.v 0.1, relative to a white Lambertian surface:
 
 | light at n.l 0.1 | F at n.h (as implemented) | F at v.h |
 |---|---|---|
@@ -151,8 +151,8 @@ CAUSES = {
     (
         "babylon-standard",
         "energy",
-    ): "E in the table, which is stored with 8 bits and a common divisor, has errors of up to "
-    "{table:.1%} at roughness 0.25 and above. An error of this size is invisible.",
+    ): "The albedo table is stored as an 8-bit RGBD image (colors with a common divisor in alpha). Its values of E "
+    "have errors of up to {table:.1%} at roughness 0.25 and above. An error of this size is invisible.",
     (
         "babylon-standard",
         "precision",
@@ -194,14 +194,16 @@ CAUSES = {
         "babylon-sheen",
         "energy",
     ): "A specular lobe is added over a white base. At grazing angles, the sheen adds further light: at sheen "
-    "roughness 0.1 and n.v 0.05, the lobe reflects {sheen_10:.2f}, whereas the table, by which the base is reduced, "
-    "has {sheen_taken_10:.2f}; at sheen roughness 0.25, the values are {sheen_25:.2f} and {sheen_taken_25:.2f}.",
+    "roughness 0.1 and n.v 0.05, the lobe reflects {sheen_10:.2f}, whereas the sheen-albedo table from which the "
+    "reduction of the base is computed contains {sheen_taken_10:.2f}; at sheen roughness 0.25, the values are "
+    "{sheen_25:.2f} and {sheen_taken_25:.2f}.",
     ("babylon-sheen", "precision"): "Same as for the standard material.",
     ("babylon-anisotropic", "reciprocity"): "Same as for the standard material.",
     (
         "babylon-anisotropic",
         "energy",
-    ): "Same as for the standard material; in addition, the table is read at `roughness`.",
+    ): "Same as for the standard material; in addition, E is looked up at `roughness`, whereas the lobe is wider "
+    "along the tangent.",
     ("babylon-anisotropic", "precision"): "Same as for the standard material.",
 }
 
@@ -242,12 +244,14 @@ ENGINE = Engine(
         "White dielectric": "By default, the diffuse lobe is scaled by 1 - 0.04 at all angles. At roughness 0.1 and "
         "n.v 0.05, the specular lobe alone returns {gloss:.2f}, and the diffuse lobe still returns "
         "{diffuse_standard:.2f}.",
-        "White dielectric, legacy conservation off": "At the same roughness and angle, the diffuse lobe returns "
-        "{diffuse_conserving:.2f}: see the angle of F below. For light from an environment map, the diffuse lobe is "
+        "White dielectric, legacy conservation off": "At roughness 0.1 and n.v 0.05, the diffuse lobe still "
+        "returns {diffuse_conserving:.2f}. It is scaled by 1 - F, but with F at n.h instead of v.h: see "
+        "[below](#the-diffuse-lobe-is-reduced-by-f-at-nh). For light from an environment map, the diffuse lobe is "
         "instead reduced by the albedo of the specular lobe.",
-        "White, half metal": "F0 is mixed before the compensation factor, 1 + F0 (1 / E - 1), is applied, although "
-        "this factor is meant for a single F0.",
-        "White metal, anisotropy 0.7": "The table is read at `roughness`, whereas the lobe is wider along the tangent.",
+        "White, half metal": "The F0 of the dielectric and that of the metal are blended before the compensation "
+        "factor, 1 + F0 (1 / E - 1), is applied, although this factor is meant for a single F0.",
+        "White metal, anisotropy 0.7": "The engine looks up E in its albedo table at `roughness`, whereas the lobe is "
+        "wider along the tangent.",
         "White dielectric, clear coat of this roughness": "At roughness 0.1 and n.v 0.05, the coat and the specular "
         "lobe over a black base return {coated_black:.2f}; the white base, which returns {bare:.2f} without a coat, is "
         "scaled by 1 - F(v.h) for each light. At grazing view angles, v.h is large and F small for most light "

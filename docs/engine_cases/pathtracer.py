@@ -96,7 +96,8 @@ ENGINE = Engine(
         "White metal": "The lobe models single scattering only, without compensation, as in most path tracers; the "
         "loss is that of single-scattering GGX.",
         "White dielectric": "See *energy* below.",
-        "White dielectric, white sheen of this roughness": "See the cosine of the sheen below.",
+        "White dielectric, white sheen of this roughness": "See [the cosine of the sheen]"
+        "(#the-cosine-of-the-sheen).",
     },
     trials=trials,
     sections=sections,

@@ -73,7 +73,8 @@ units."""
 
 
 CAUSES = {
-    ("playcanvas-standard", "energy"): "G is that of a smoother surface: see the width in G above.",
+    ("playcanvas-standard", "energy"): "G is that of a smoother surface: see "
+    "[above](#the-width-in-g-is-squared-twice).",
     ("playcanvas-sheen", "energy"): "`combineColor` scales the base by 1 - 0.157 times the color of the sheen at "
     "all angles, whereas the lobe D V of white sheen alone reflects {sheen_25:.2f} at width 0.25 and n.v 0.05 "
     "({sheen_100:.2f} at width 1). In addition, the base gains light as above.",
@@ -106,8 +107,8 @@ ENGINE = Engine(
         ),
     ),
     remarks={
-        "White metal": "See the width in G below. At roughness 1, both widths are the same, and the loss is that of "
-        "single scattering.",
+        "White metal": "G is that of a smoother surface: see [below](#the-width-in-g-is-squared-twice). At roughness "
+        "1, both widths are the same, and the loss is that of single scattering.",
         "White dielectric, lamp of 1 / pi": "Without area lights, the diffuse lobe is not reduced by F, and the "
         "specular lobe is added to it.",
     },

@@ -114,16 +114,16 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
             ("16 x 16, first and last texel at 0 and 1", "edges_16"),
         )
     )
-    return f"""## The figures of #33983
+    return f"""## The values reported in #33983
 
 | roughness | n.v | thread: before | {old} | thread: after | {new} |
 |---|---|---|---|---|---|
 {listed}
 
-The thread's figures are confirmed in all four rows, both by Gonio's reading of the shader and by WebGLRenderer itself
-([below](#reproducing-these-results)). Before the change, `BRDF_GGX_Multiscatter` added a lobe scaled by the product of
-the losses of both directions. For roughness 1 at normal incidence, single scattering returns {before["none"]:.3f}, and
-the added lobe raises this to {before["own"]:.3f}, which recovers
+The values reported in the thread are confirmed in all four rows, both by Gonio's reading of the shader and by
+WebGLRenderer itself ([below](#reproducing-these-results)). Before the change, `BRDF_GGX_Multiscatter` added a lobe
+scaled by the product of the losses of both directions. For roughness 1 at normal incidence, single scattering returns
+{before["none"]:.3f}, and the added lobe raises this to {before["own"]:.3f}, which recovers
 {(before["own"] - before["none"]) / (1 - before["none"]):.0%} of the loss. Equation 16 of Turquin, used in {new},
 divides by the energy of single scattering, so that only the errors of the table remain.
 
@@ -169,24 +169,24 @@ CAUSES = {
     (
         "three-standard(metal=0)",
         "linearity",
-    ): "Between metal and dielectric, the mixed F0 is multiplied by 1 + F0 (1 / E - 1), "
+    ): "Between metal and dielectric, the blended F0 is multiplied by 1 + F0 (1 / E - 1), "
     "so that the color enters squared while its share in the diffuse lobe decreases. An error of this size is "
     "invisible.",
     ("three-standard", "linearity"): "`BRDF_GGX_Multiscatter` multiplies FssEss of both directions by Favg, so that "
     "the color enters only as its third power. An error of this size is invisible.",
     ("three-physical", "reciprocity"): "Same as for the standard material; with a clear coat, the base is also scaled "
     "by 1 - clearcoat F(n.v) at the end of `meshphysical`, which depends only on the view direction.",
-    ("three-physical", "energy"): "Sheen and a specular lobe are added over a white base. `IBLSheenBRDF` is the albedo "
-    "by which `RE_Direct_Physical` reduces the base: at sheen roughness 0.25 and n.v 0.05, the base is reduced by "
-    "{sheen_taken_25:.2f}, whereas the lobe D_Charlie V_Neubelt reflects {sheen_25:.2f}; at sheen roughness 0.1, the "
-    "values are {sheen_taken_10:.2f} and {sheen_10:.2f}, so that the sheen lobe alone gains light. For the specular "
-    "lobe, see the white-furnace results for the white dielectric.",
+    ("three-physical", "energy"): "Sheen and a specular lobe are added over a white base. `IBLSheenBRDF` is the sheen "
+    "albedo from which `RE_Direct_Physical` computes the reduction of the base: at sheen roughness 0.25 and n.v 0.05, "
+    "the base is reduced by {sheen_taken_25:.2f}, whereas the lobe D_Charlie V_Neubelt reflects {sheen_25:.2f}; at "
+    "sheen roughness 0.1, the values are {sheen_taken_10:.2f} and {sheen_10:.2f}, so that the sheen lobe alone gains "
+    "light. For the specular lobe, see the white-furnace results for the white dielectric.",
     ("three-anisotropic", "reciprocity"): "Same as for the standard material.",
     (
         "three-anisotropic",
         "energy",
     ): "Same as for the standard material. The loss of up to a fifth at high anisotropy is not "
-    "a violation: the table is read at `roughness`, which is the smaller of the two widths (`alphaT` is larger).",
+    "a violation: E is looked up at `roughness`, which is the smaller of the two widths (`alphaT` is larger).",
     ("three-iridescent", "positivity"): "`Fresnel0ToIor` takes the square root of a base reflectance "
     "of 0, and the phase of the film involves a square root at grazing incidence. No value is wrong.",
     ("three-iridescent", "reciprocity"): "Same as for the standard material; in addition, `evalIridescence` is called "
@@ -259,10 +259,11 @@ ENGINE = Engine(
         "diffuse lobe still returns {gloss_diffuse:.2f}. `RE_IndirectDiffuse_Physical` in the same chunk instead uses "
         "1 minus the albedo of the specular lobe. Release 0.185.1 does not reduce the diffuse lobe of direct light at "
         "all.",
-        "White, half metal": "F0 is mixed before the compensation factor, 1 + F0 (1 / E - 1), is applied, although "
-        "this factor is meant for a single F0; `RE_IndirectSpecular_Physical` compensates metal and dielectric "
-        "separately and then mixes them.",
-        "White metal, anisotropy 0.7": "The table is read at `roughness`, whereas the lobe is wider along the tangent.",
+        "White, half metal": "The F0 of the dielectric and that of the metal are blended before the compensation "
+        "factor, 1 + F0 (1 / E - 1), is applied, although this factor is meant for a single F0; "
+        "`RE_IndirectSpecular_Physical` compensates metal and dielectric separately and then blends them.",
+        "White metal, anisotropy 0.7": "The engine looks up E in its albedo table at `roughness`, whereas the lobe is "
+        "wider along the tangent.",
         "White dielectric, clear coat of this roughness": "The base is scaled by 1 - F(n.v) of a smooth coat, whereas "
         "a rough coat reflects less light than that at grazing angles.",
         "White dielectric, coat and sheen": "The roughness in the table is that of the coat and the sheen; the "

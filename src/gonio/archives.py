@@ -26,7 +26,8 @@ class Unreadable(ValueError):
 def read(path: Path, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """All arrays in a file by name, or those of `names` that exist. Objects (pickles) are never loaded.
 
-    Raises Unreadable, and OSError if the file cannot be opened.
+    Raises Unreadable if the file is not an .npz archive, is damaged or unpacks to an implausible size, and OSError if
+    it cannot be opened.
     """
     with open(path, "rb") as file:
         try:

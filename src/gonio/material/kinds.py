@@ -192,7 +192,7 @@ class _Numeric(Parameter):
 
 
 class NumberParameter(_Numeric):
-    """A number. Bound, it is a Dr.Jit float."""
+    """A number. In a bound material, its value is a Dr.Jit float."""
 
     kind = "float"
 
@@ -208,7 +208,8 @@ class IndexParameter(NumberParameter):
 
 
 class ColorParameter(_Numeric):
-    """A color: a number (gray), three values, or an array (N, 3). Bound, it is a spectrum."""
+    """A color: a number (gray), three values, or an array (N, 3). In a bound material, its value is a
+    spectrum."""
 
     kind = "spectrum"
     dimensions = 1
@@ -227,7 +228,8 @@ class ColorParameter(_Numeric):
 
 
 class WidthParameter(_Numeric):
-    """A microfacet width alpha, or a tuple of two (along x, along y). Bound, it is a pair."""
+    """A microfacet width alpha, or a tuple of two (along x, along y). In a bound material, its value is a
+    pair."""
 
     kind = "alpha"
     symbol_type = "vec2"
@@ -248,8 +250,8 @@ class WidthParameter(_Numeric):
 
 
 class AngleParameter(_Numeric):
-    """An angle in radians. Bound, it is the pair (cos, sin), or None for the plain number 0, for which no rotation is
-    compiled."""
+    """An angle in radians. In a bound material, its value is the pair (cos, sin), or None for the plain number 0, for
+    which no rotation is compiled."""
 
     kind = "angle"
     symbol_type = "vec2"

@@ -138,7 +138,8 @@ def spectrum(
 
 
 def width(default: PlainWidth | None = None, doc: str = "", *, low: float = 0.0, high: float = 1.0) -> Width:
-    """Declare a microfacet width alpha, or a tuple of two (along x, along y). Bound, it is a vector of two.
+    """Declare a microfacet width alpha, or a tuple of two (along x, along y). In a bound material, its value is a
+    vector of two.
 
     low  the smallest alpha at which the model is valid: 0 if it becomes a mirror there, positive if it divides by alpha
     For the other arguments, see `number`.
@@ -147,8 +148,8 @@ def width(default: PlainWidth | None = None, doc: str = "", *, low: float = 0.0,
 
 
 def angle(default: PlainNumber = 0.0, doc: str = "") -> Angle:
-    """Declare an angle in radians, with its default and documentation. Bound, it is the vector (cos, sin), or None for
-    the plain number 0."""
+    """Declare an angle in radians, with its default and documentation. In a bound material, its value is the vector
+    (cos, sin), or None for the plain number 0."""
     return _declare(AngleParameter, default, doc, unit="rad")
 
 

@@ -20,10 +20,10 @@ _PLAIN = (float, int, str, bool, type(None), np.ndarray)  # types that contain n
 
 
 class LocalNames:
-    """Gives the values of the function that is being recorded the names of the Python variables that hold them.
+    """Names each value of the function being recorded after the Python variable that holds it.
 
     A name in the function's own frame has priority over one in a plain function that it calls, and the first name over
-    a later one. Frames are searched up to that of the code `outermost`.
+    a later one. Frames are searched up to the frame of the code object `outermost`.
     """
 
     def __init__(self, function: Any, node: type[Any], outermost: CodeType) -> None:

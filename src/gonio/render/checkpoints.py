@@ -72,7 +72,7 @@ class Keeper:
     """Writes checkpoints during a render, in a separate thread.
 
     path       the file; None writes nothing
-    prepared   the render whose sums are written
+    prepared   the prepared render whose accumulated sample sums are written
     temporary  whether the checkpoint is automatic: written only once the job is expected to take more than `LONG_JOB`
                seconds, and removed after the picture has been written
     long       seconds to use instead of `LONG_JOB`

@@ -35,7 +35,9 @@ class _Frame(NamedTuple):
 
 
 class NormalMap(BSDF):
-    """A base with a tilted normal, n' = (lean_x, lean_y, 1), normalized; in scenes, given by an image, `"normalmap"`.
+    """A base material with a tilted shading normal, n' = (lean_x, lean_y, 1), normalized.
+
+    In scenes, the image under the key `"normalmap"` gives the normals.
 
     f cos theta_i = b(o, i) + b(o, i*), where b is `eval` of the base in the frame of n', and i* = (i_x, i_y, -i_z)
 
@@ -58,7 +60,8 @@ class NormalMap(BSDF):
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"lean_x": 0.0, "lean_y": 0.0}, equals=lambda one: one.base),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the normal is bent toward the view, and light scattered below the surface is reflected upward",
+            "a normal that faces away from the view is bent toward it, and light that an opaque base scatters below "
+            "the surface is reflected upward",
             lambda model: 2.0 if model.perturbs_normal else 0.0,
             certain=False,
         ),
@@ -176,7 +179,9 @@ def _flipped(w: Direction) -> Direction:
 
 
 class Bump(NormalMap):
-    """A base with the normal of a height field (Blinn1978); in scenes, the heights are given by an image, `"bump"`.
+    """A base material whose shading normal is that of a height field (Blinn1978).
+
+    In scenes, the image under the key `"bump"` gives the heights.
 
     The height h(u, v) is in scene units and has the derivatives h_u and h_v. With dp/du = (l, 0) and dp/dv = (s, m) in
     the tangent plane, its gradient is g = (h_u / l, (h_v - s h_u / l) / m), and n' = (-g, 1), normalized. Outside
