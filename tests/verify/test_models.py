@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import gonio as go
 import pytest
+from gonio.material import tree
 from gonio.ops import backend
 from gonio.verify import verify
 
@@ -49,3 +51,42 @@ def test_another_value_compiles_no_kernel() -> None:
         kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     assert len(kernels) > 20
     assert sum(not k["cache_hit"] for k in kernels) == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "law", "status"),
+    [
+        (
+            "sheen-charlie",
+            {"albedo": 0.0, "alpha": 0.01},
+            "energy",
+            "breaks as declared",
+        ),  # that of the lossless variant
+        (
+            "normal-map(base=conductor)",
+            {"base.alpha": 0.3},
+            "gradients",
+            "pass",
+        ),  # a kink at no tilt, for views along the surface
+        pytest.param(
+            "turquin(base=conductor)",
+            {"base.alpha": (0.16, 0.0016)},
+            "energy",
+            "breaks as declared",
+            marks=pytest.mark.slow,
+        ),
+        ("fdez-aguera(base=conductor)", {"base.alpha": (0.16, 0.0016)}, "energy", "breaks as declared"),
+        # widths of the base outweigh those of the top
+        pytest.param(
+            "coat(base=conductor)",
+            {"base.alpha": (0.5, 0.1), "alpha": (0.05, 0.3)},
+            "isotropy",
+            "pass",
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_what_only_thorough_trials_met(name: str, values: dict[str, Any], law: str, status: str) -> None:
+    material = tree.replace(go.material(name), values)
+    verdict = verify(material, law=law).cards[0][law]
+    assert verdict.status == status, verdict.why

@@ -348,7 +348,7 @@ def decide(
             finding.notes.append(text)
     over = not finding.figure <= finding.tolerance
     status = FAIL if why or statistical or over else PASS
-    breach = one.breaches.get(law.name)
+    breach = finding.known or one.breaches.get(law.name)
     if breach is not None:
         size = finding.figure if finding.breach is None else finding.breach
         if why or statistical:

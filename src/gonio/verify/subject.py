@@ -130,8 +130,11 @@ class Subject:
         """The same BSDF with diffuse inner materials, which violate no law."""
         if hasattr(self.model, "with_diffuse_inside"):
             return Subject(self.model.with_diffuse_inside(), self.target, self.settings)
-        sound = models()["lambert"]()
-        return Subject(tree.replace(self.model, dict.fromkeys(tree.children(self.model), sound)), self.target)
+        return self.with_inside(models()["lambert"]())
+
+    def with_inside(self, material: BSDF) -> Subject:
+        """The same material with another one in place of each inner material."""
+        return Subject(tree.replace(self.model, dict.fromkeys(tree.children(self.model), material)), self.target)
 
     @functools.cached_property
     def sides(self) -> tuple[int, ...]:

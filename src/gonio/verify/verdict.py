@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material import KnownViolation
 from .quality import Quality
 from .severity import Bias, Grade
 from .subject import Subject
@@ -64,6 +65,7 @@ class Finding:
     untried    the reason why part of the law could not be tested, so that it cannot pass; "" if all was tested
     notes      further information
     breach     size to compare with a declared violation, if it is not `figure`
+    known      the declared violation of the tested variant, such as the lossless one, if it is not that of the subject
     evidence   data for the figure in the report
     details    data for the methods `bias` and `ratios` of the law
     """
@@ -81,6 +83,7 @@ class Finding:
     untried: str = ""
     notes: list[str] = dataclasses.field(default_factory=list)
     breach: float | None = None
+    known: KnownViolation | None = None
     evidence: Evidence | None = None
     details: object = None
 

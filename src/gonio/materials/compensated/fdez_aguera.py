@@ -15,7 +15,7 @@ from ...ops import Direction, Mode, Scalar, Spectrum, abs, function, maximum, wh
 from ...optics import warp
 from ...optics.fresnel.schlick import schlick_average
 from ...optics.roughness import widths
-from ._compensated import _Compensated, lobe_ratio
+from ._compensated import INTERPOLATED, _Compensated, lobe_ratio
 from .kulla_conty import f_add
 
 
@@ -45,10 +45,15 @@ class FdezAguera(_Compensated):
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "reciprocity": KnownViolation("the diffuse term depends on the view direction only", 4.0, certain=False)
+        "reciprocity": KnownViolation("the diffuse term depends on the view direction only", 4.0, certain=False),
+        "energy": INTERPOLATED,
     }
-    lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False
+
+    @property
+    def lossless_tolerance(self) -> float:  # type: ignore[override]
+        """The loss allowed in a white furnace: the error of the tables."""
+        return 0.01 if self.anisotropic else 2e-3
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:

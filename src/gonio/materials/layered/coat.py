@@ -26,6 +26,7 @@ from ...material import (
 )
 from ...material import width as width_parameter
 from ...material.bsdf import Delta
+from ...material.parameters import pair_of
 from ...ops import Direction, Mode, Pair, Scalar, Spectrum, clamp, exp, function, inv_pi, maximum, mean, sqr, where
 from ...optics import frame, fresnel
 from ...optics.fresnel import exact
@@ -59,7 +60,8 @@ class Coat(BSDF):
     the color of the base, which becomes neither darker nor more saturated.
 
     The base is embedded in the coat, so its own index is relative to the coat. A rough top reflects like rough glass,
-    with albedo R; refracted light is not blurred. g and rest are read from tables that are computed on first use.
+    with albedo R; refracted light is not blurred. g and rest are read from tables that are computed on first use. For
+    a top of two widths over a narrow lobe, the albedo may be 2 % too large.
     Colors of the base may vary over the surface, as may the coat's own absorption and depth, which are axes of the
     tables; other values must not vary, and derivatives with respect to them omit the change of the tables.
     """
@@ -68,7 +70,7 @@ class Coat(BSDF):
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
             "reflection and transmission by a rough top are sampled from rough glass, with this error",
-            lambda model: 0.0 if microfacet.delta_of(model.alpha) == "always" else 0.004,
+            lambda model: _gain(model),
             certain=False,
         ),
     }
@@ -289,3 +291,13 @@ class Coat(BSDF):
     def delta(self) -> Delta:
         top = microfacet.delta_of(self.plain.alpha)
         return "always" if self._mirror else "never" if top == "never" else "maybe"
+
+
+def _gain(model: Coat) -> float:
+    """The largest gain in a white furnace: for a top of two widths, measured at 15 random settings with an index from
+    1.1 to 2.5, widths of the top from 0.0015 to 0.5 and of the base below 0.02, plus a third of it."""
+    if microfacet.delta_of(model.alpha) == "always":
+        return 0.0
+    x, y = pair_of(model.alpha)
+    one = x is y or (isinstance(x, int | float) and isinstance(y, int | float) and x == y)
+    return 0.004 if one else 0.03

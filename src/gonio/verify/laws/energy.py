@@ -207,7 +207,7 @@ class Energy(Law):
         gain = float((value - error).max() - 1.0)
         theta = directions.angles(wo)[:, 0]
         if gain > finding.figure:
-            finding.figure = gain
+            finding.figure, finding.known = gain, white.breaches.get("energy")
             if gain > GAIN:
                 finding.shown = f"gain {gain:.4f} in a white furnace"
             finding.worst = (
@@ -257,6 +257,7 @@ class Energy(Law):
             gain = float((albedo - error).max() - 1.0)
             if gain > max(finding.figure, GAIN):
                 finding.figure, finding.settings = gain, {path: value}
+                finding.known = whitened.breaches.get("energy")
                 finding.shown = f"gain {gain:.4f}"
                 finding.worst = f"{path} = {value}: albedo {albedo.max():.5f}"
 

@@ -262,9 +262,16 @@ def _judged(
     smooth = np.all(np.abs(wide - narrow) <= noise, axis=1) & (lit.all(0) == lit.any(0))
     # A kink exactly at the parameter's value, such as a node of a table: the central difference is the mean of its
     # two slopes, and any value between them is a derivative.
-    left, right = ((4.0 * shifted[0.5 * s] - shifted[s] - 3.0 * plain) / (s * step) for s in (-1.0, 1.0))
+    sides = (-1.0, 1.0)
+    second = [(4.0 * shifted[0.5 * s] - shifted[s] - 3.0 * plain) / (s * step) for s in sides]  # order of accuracy
+    third = [
+        (16.0 / 3.0 * shifted[0.5 * s] - 2.0 * shifted[s] + shifted[2.0 * s] / 6.0 - 3.5 * plain) / (s * step)
+        for s in sides
+    ]
+    left, right = third
     steep = np.maximum(np.abs(left), np.abs(right))
     slack = 1e-6 * steep + 1e-8 * float(np.percentile(steep, 90.0))
+    slack += np.maximum(*[np.abs(a - b) for a, b in zip(second, third, strict=True)])
     kink = np.any(np.abs(right - left) > 2.0 * slack, axis=1)
     between = (exact >= np.minimum(left, right) - slack) & (exact <= np.maximum(left, right) + slack)
     return _Derivatives(exact, narrow, smooth & ~(kink & np.all(between, axis=1)), least)

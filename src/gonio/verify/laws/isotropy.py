@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from typing import TypeAlias
 
 import numpy as np
 
 from ...errors import InputError
+from ...material import BSDF, models, tree
 from .. import directions, severity
 from ..effort import Effort
 from ..forensics.ratio import Cause
@@ -175,6 +177,9 @@ class Isotropy(Law):
         pair = getattr(subject.model, name, None)
         if not isinstance(pair, tuple | list):
             return
+        if subject.inner and isinstance(subject.model, BSDF):  # their lobes may be wider, along other axes
+            with contextlib.suppress(InputError):
+                subject = subject.with_inside(tree.replace(models()["lambert"](), {"albedo": 0.0}))
         along, across, _ = _spread(subject)
         if not along + across > 0.0:
             return
