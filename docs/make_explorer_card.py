@@ -140,7 +140,7 @@ def page(stored: dict[str, Any]) -> str:
 def _follows(one: dict[str, str]) -> str:
     """The explanation of a failure that follows from that of another law, such as NaN."""
     match = re.fullmatch(r"follows from (\w+)'s", one["cause"])
-    return f"follows from the failure of {match[1].lower()}." if match else ""
+    return f"follows from the failure of the law {match[1].lower()}." if match else ""
 
 
 def _table(models: dict[str, Any]) -> list[str]:

@@ -1,4 +1,7 @@
-# mitsuba:hair: energy. Mitsuba 3.9.1, 2026-11-22.
+# mitsuba:hair: energy. Mitsuba 3.9.1, 2026-11-28.
+import glob, os, sys
+for library in glob.glob(sys.prefix + "/lib/libLLVM*.so*"):  # LLVM 14 to 16, which a system may have, abort
+    os.environ.setdefault("DRJIT_LIBLLVM_PATH", library)
 import drjit as dr
 import mitsuba as mi
 
@@ -8,7 +11,7 @@ n = 1 << 24
 si, ctx, rng = dr.zeros(mi.SurfaceInteraction3f, n), mi.BSDFContext(), mi.PCG32(n)
 si.sh_frame, si.n, si.uv = mi.Frame3f([1, 0, 0], [0, 1, 0], [0, 0, 1]), [0, 0, 1], [0.5, 0.5]
 si.dp_du, si.dp_dv, si.t, si.prim_index = [1, 0, 0], [0, 1, 0], 1, 0
-si.wi = mi.Vector3f(0.745281279, 0.561609685, -0.359375)
+si.wi = mi.Vector3f(0.74556917, 0.561826646, -0.358437508)
 ctx.mode = mi.TransportMode.Importance  # power, without the factor eta^2 of radiance
 i = dr.arange(mi.UInt32, n)
 t, phi = (mi.Float(i >> 12) + 0.5) / 2048 - 1, (mi.Float(i & 4095) + 0.5) * (dr.pi / 2048)
@@ -16,4 +19,4 @@ z = t * dr.abs(t)
 wo, area = mi.Vector3f(*(dr.sqrt(1 - z * z) * v for v in (dr.cos(phi), dr.sin(phi))), z), 8 * dr.pi * dr.abs(t) / n
 bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
 values, samples = dr.sum(bsdf.eval(ctx, si, wo) * area, axis=1), dr.mean(weight, axis=1)
-assert dr.all(dr.abs(values - samples) < 0.0003), f"albedo {values} by eval, {samples} by sample"
+assert dr.all(dr.abs(values - samples) < 0.00029), f"albedo {values} by eval, {samples} by sample"

@@ -1,4 +1,7 @@
-# mitsuba:pplastic: pdf. Mitsuba 3.9.1, 2026-11-22.
+# mitsuba:pplastic: pdf. Mitsuba 3.9.1, 2026-11-28.
+import glob, os, sys
+for library in glob.glob(sys.prefix + "/lib/libLLVM*.so*"):  # LLVM 14 to 16, which a system may have, abort
+    os.environ.setdefault("DRJIT_LIBLLVM_PATH", library)
 import drjit as dr
 import mitsuba as mi
 

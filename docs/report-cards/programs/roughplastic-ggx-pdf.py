@@ -1,4 +1,7 @@
-# mitsuba:roughplastic, distribution = ggx: pdf. Mitsuba 3.9.1, 2026-11-22.
+# mitsuba:roughplastic, distribution = ggx: pdf. Mitsuba 3.9.1, 2026-11-28.
+import glob, os, sys
+for library in glob.glob(sys.prefix + "/lib/libLLVM*.so*"):  # LLVM 14 to 16, which a system may have, abort
+    os.environ.setdefault("DRJIT_LIBLLVM_PATH", library)
 import drjit as dr
 import mitsuba as mi
 
@@ -16,4 +19,4 @@ wo, area = mi.Vector3f(*(dr.sqrt(1 - z * z) * v for v in (dr.cos(phi), dr.sin(ph
 bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
 claimed = dr.sum(dr.select(mi.Bool(True), bsdf.pdf(ctx, si, wo) * area, 0))
 drawn = dr.mean(dr.select(dr.any(weight > 0) & (mi.Bool(True)), 1.0, 0.0))
-assert dr.abs(claimed - drawn) < 0.25, f"the pdf integrates to {claimed}, but the fraction of samples is {drawn}"
+assert dr.abs(claimed - drawn) < 0.2, f"the pdf integrates to {claimed}, but the fraction of samples is {drawn}"

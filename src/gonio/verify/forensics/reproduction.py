@@ -41,6 +41,12 @@ z = t * dr.abs(t)
 wo, area = mi.Vector3f(*(dr.sqrt(1 - z * z) * v for v in (dr.cos(phi), dr.sin(phi))), z), 8 * dr.pi * dr.abs(t) / n
 """
 SAMPLE = "bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
+# the same, with random numbers that are often at the ends of their range
+SAMPLE_ENDS = """def number():
+    u, v = rng.next_float32(), rng.next_float32()
+    return dr.select(v < 0.2, 0, dr.select(v < 0.4, 0.99999994, u))
+bs, weight = bsdf.sample(ctx, si, number(), mi.Point2f(number(), number()))
+"""
 
 
 def script(law: str, subject: Subject, finding: Finding) -> str:
@@ -150,7 +156,7 @@ def _pdf(subject: Subject, finding: Finding) -> str:
 def _weight(subject: Subject, finding: Finding) -> str:
     if finding.at is None:
         return ""
-    text = _head(subject, finding.at[0]) + SAMPLE
+    text = _head(subject, finding.at[0]) + SAMPLE_ENDS
     return text + (
         "values, samples = bsdf.eval(ctx, si, bs.wo), weight * bs.pdf\n"
         "wrong = dr.any(dr.abs(values - samples) > 0.01 * dr.maximum(values, samples)) & dr.any(weight > 0)\n"
@@ -178,9 +184,12 @@ def _positivity(subject: Subject, finding: Finding) -> str:
         return ""
     wo, wi = finding.at
     return _head(subject, wo) + (
-        f"wo = {_vector(wi)}\n" + SAMPLE + "values = [bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf]\n"
+        f"wo = {_vector(wi)}\n"
+        + SAMPLE_ENDS
+        + "values = bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf\n"
         "good = [dr.all(dr.isfinite(v) & (v >= 0), axis=None) for v in values]\n"
-        'assert dr.all(good, axis=None), f"valid values of eval, pdf, weight, pdf of the sample: {good}"\n'
+        "good.append(dr.all(dr.isfinite(bs.wo), axis=None))\n"
+        'assert dr.all(good, axis=None), f"valid eval, pdf, weight, pdf and direction of the sample: {good}"\n'
     )
 
 
@@ -236,6 +245,12 @@ CALLS = {
     "value, pdf = bsdf.eval_pdf(ctx, si, wo)\n"
     "wrong = dr.any(value != bsdf.eval(ctx, si, wo)) | (pdf != bsdf.pdf(ctx, si, wo))\n"
     'assert dr.count(wrong) < 0.01 * n, f"eval_pdf is not eval and pdf for {dr.count(wrong)} of {n} pairs"\n',
+    "shading frame": "u, v = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())\n"
+    "first = bsdf.sample(ctx, si, u, v)[1]\n"
+    "s, t, up = mi.Vector3f(0.48, 0.64, -0.6), mi.Vector3f(-0.8, 0.6, 0), mi.Vector3f(0.36, 0.48, 0.8)\n"
+    "si.sh_frame, si.n, si.dp_du, si.dp_dv = mi.Frame3f(s, t, up), up, s, t\n"
+    "wrong = dr.any(dr.abs(bsdf.sample(ctx, si, u, v)[1] - first) > 1e-3 * first)\n"
+    'assert dr.count(wrong) < 0.01 * n, f"rotation changes the weight of {dr.count(wrong)} of {n} samples"\n',
     "flags": SAMPLE + "last = dr.max(dr.select(dr.any(weight > 0), bs.sampled_component, 0))\n"
     "count, kinds = bsdf.component_count(), [bsdf.flags(k) for k in range(bsdf.component_count())]\n"
     'assert dr.all(last < count), f"sampled_component is {last}, but there are {count} components: {kinds}"\n',
