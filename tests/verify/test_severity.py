@@ -192,7 +192,7 @@ def test_what_is_held_is_judged_alone() -> None:
     assert (
         verdict.failed
         and verdict.grade is Grade.INNER
-        and "with a correct inner material, the law holds" in verdict.cause
+        and "with a correct material in its place, it holds" in verdict.cause
     )
 
 
