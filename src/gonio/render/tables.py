@@ -63,36 +63,31 @@ def bake(
     ndf: str | None = None,
     levels: int | None = None,
 ) -> Baked:
-    """Bake tables of directional albedo, its average, the split sum and rough glass, or prefilter an environment for
-    the split sum; the manifest describes each table and states its error.
+    """Bake tables of directional albedo, its average, the split sum and rough glass, or prefilter an environment.
 
         go.bake("ggx", "tables").arrays["E"]            # [roughness, mu]
         go.bake("sky.hdr", "sky", ndf="beckmann")       # level_0, level_1 ... [theta, phi, rgb]
 
-    target    a distribution by name (F = 1), or a material, such as "conductor(preset=Au)"; or a picture of an
-              environment (.hdr, .exr, .npz; latitude-longitude), for which "prefiltered" is the only table
+    target    a distribution by name (F = 1), a material, or an environment (.hdr, .exr, .npz; latitude-longitude), for
+              which "prefiltered" is the only table
     output    folder for the files; if writing fails, none of them is written. None writes nothing
-    lut       any of "E", "Eavg", "dfg", "glass"; None bakes every table that applies to the target, except glass. Or
-              "ltc" alone: linearly transformed cosines of the target, with shader code for quadrilateral area lights
-    resolution  texels along each axis: 1 to 4096, by default 128. For "ltc": 2 to 256, by default 64, or 16 if the
-              target is anisotropic
+    lut       any of "E", "Eavg", "dfg", "glass"; or "ltc" alone: linearly transformed cosines, with shader code for
+              quadrilateral area lights. None bakes every table that applies to the target, except glass
+    resolution  texels along each axis: 1 to 4096, by default 128; for "ltc" 2 to 256, by default 64 (anisotropic: 16)
     method    "quadrature", or the density to sample: "cosine", the distribution's name, or "visible"
     samples   number of samples per texel, unless `method` is "quadrature"
-    sampler   points of the samples: "hammersley" uses the same points for every texel; "independent" and "stratified"
-              use random points, which `seed` determines
+    sampler   "hammersley", the same points for every texel; or, with `seed`, "independent" or "stratified"
     masking   masking of a distribution
     layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures)
     store     values in the homework's pictures of E and E_avg: "E" or "1-E"
-    flip      whether the bottom row of the homework's pictures, not the top row, has the lowest roughness
-    wrap      whether values in the homework's pictures are rounded down to bytes, and 256 wraps around to 0; otherwise,
-              they are clipped and rounded to the nearest byte
-    aspect    alpha_y / alpha_x of a distribution; a value other than 1 adds an axis phi with `azimuths` entries
+    flip      whether the bottom row of the homework's pictures has the lowest roughness
+    wrap      whether values in these pictures are rounded down to bytes, and 256 wraps around to 0
+    aspect    alpha_y / alpha_x of a distribution, which adds an axis phi with `azimuths` entries
     floor     lower bound of the denominator of D, for method "cosine"
     preset    "homework-text" or "homework-figure": the options of PRESETS, in place of `masking`, `method` and so on
-    ndf       for an environment: the distribution for prefiltering (None: ggx) into `levels` levels of roughness 0 to 1
-              (None: 6); the error of the split sum is measured with `masking`
-    Tables of distributions and of Gonio's microfacet materials, except "ltc", are stored in the user's cache and read
-    from there when they are requested again. Returns a Baked: `arrays` by name and `manifest`.
+    ndf       for an environment: the distribution (None: ggx) of `levels` levels of roughness 0 to 1 (None: 6)
+    Tables of microfacets, except "ltc", are kept in the user's cache. Returns a Baked: `arrays` by name and `manifest`,
+    which describes each table and states its error.
     Raises InputError for invalid options or a folder that cannot be written, MachineError if the disk is full.
     """
     if preset is not None:

@@ -18,28 +18,25 @@ if TYPE_CHECKING:
     from ...instruments.capture.run import Capture
 
 
+Photographs = Annotated[
+    list[str],
+    Argument(metavar="PHOTOS...", help="Folder with a calibration.json, or photographs that the calibration lists."),
+]
+Models = Annotated[
+    list[str] | None,
+    Option("--model", "-m", metavar="NAME", help='Model to fit, such as "lambert+ggx"; repeatable, to rank several.'),
+]
+
+
 @verb(MATERIALS, place=9)
 def capture(
-    photographs: Annotated[
-        list[str],
-        Argument(
-            metavar="PHOTOS...", help="Folder with a calibration.json, or photographs that the calibration lists."
-        ),
-    ],
+    photographs: Photographs,
     *,
     output: Annotated[
         Path | None,
         output_option("FILE", "Table (.gonio, .binary, ...) or fit (.json); a figure is written next to it."),
     ] = None,
-    model: Annotated[
-        list[str] | None,
-        Option(
-            "--model",
-            "-m",
-            metavar="NAME",
-            help='Model to fit, such as "lambert+ggx"; repeatable, to rank several models.',
-        ),
-    ] = None,
+    model: Models = None,
     how: Fitting,
     calibration: Annotated[
         Path | None,

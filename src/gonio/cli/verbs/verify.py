@@ -97,8 +97,7 @@ def verify(
     made: Material,
     how: Effort,
     at: Annotated[
-        str,
-        Option(metavar="O/I", help="Pair of directions to evaluate in both orders, theta,phi/theta,phi in degrees."),
+        str, Option(metavar="O/I", help="Pair of directions to evaluate in both orders: theta,phi/theta,phi, degrees.")
     ] = "",
     executor: Executor,
     as_json: Json = False,
