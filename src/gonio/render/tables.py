@@ -78,8 +78,7 @@ def bake(
     samples   number of samples per texel, unless `method` is "quadrature"
     sampler   "hammersley", the same points for every texel; or, with `seed`, "independent" or "stratified"
     masking   masking of a distribution
-    layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures)
-    store     values in the homework's pictures of E and E_avg: "E" or "1-E"
+    layout    "linear", "stretched" or "homework": linear axes, and its pictures of E or, if `store` is "1-E", of 1 - E
     flip      whether the bottom row of the homework's pictures has the lowest roughness
     wrap      whether values in these pictures are rounded down to bytes, and 256 wraps around to 0
     aspect    alpha_y / alpha_x of a distribution, which adds an axis phi with `azimuths` entries
