@@ -49,14 +49,8 @@ ORDER = [
 
 # issues and pull requests in Mitsuba's repositories about the failure or a related one
 UPSTREAM = {
-    (
-        "principled",
-        "calls",
-    ): "mitsuba3 #1951 (merged 2026-09-07, not yet released) introduces named constants for the components",
-    (
-        "principledthin",
-        "calls",
-    ): "mitsuba3 #1951 (merged 2026-09-07, not yet released) introduces named constants for the components",
+    ("principled", "calls"): "mitsuba3 #1951 (merged 2026-09-07, not yet released) names the components",
+    ("principledthin", "calls"): "mitsuba3 #1951 (merged 2026-09-07, not yet released) names the components",
     ("principled", "energy"): "mitsuba3 #465 (closed) is about the energy that its transmission loses",
     ("blendbsdf", "calls"): "mitsuba2 #151 (open): the component is always 0",
     ("blendbsdf", "positivity"): "mitsuba3 #1681 (merged 2025) fixed its pdf and null lobes",
@@ -142,7 +136,7 @@ def findings(target: str, report: Report) -> list[dict[str, Any]]:
             if not v.failed:
                 continue
             if v.reproduction and not shows(v.reproduction):
-                v.reproduction = ""  # other numbers than the given ones may be needed
+                v.reproduction = ""  # it draws too few of the random numbers at which the law fails
             name = "-".join([target.removeprefix("mitsuba:"), *map(str, card.subject.settings.values()), v.law])
             if v.reproduction:
                 PROGRAMS.mkdir(exist_ok=True)

@@ -175,6 +175,13 @@ def test_mitsubas_plugins_and_descriptions(tmp_path: Path) -> None:
     assert verify(str(own), quick=True, law=["energy", "weight"]).passed
 
 
+def test_a_lobe_of_a_plugin_that_samples_the_wrong_side_has_failed() -> None:
+    """Other lobes have light there, so eval and pdf are positive, and the pdf of the sample is that of all lobes."""
+    target = "mitsuba:principled(spec_trans=0.9,metallic=0.5,roughness=0.6)"
+    report = verify(target, quick=True, law=["weight", "reciprocity"])
+    assert report.passed, str(report)
+
+
 PLUGIN = """import mitsuba as mi
 
 class MyBlack(mi.BSDF):

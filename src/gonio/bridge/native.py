@@ -63,10 +63,12 @@ class MitsubaBSDF(BSDF):
         pdf = bs.pdf
         if self._si is None:
             # Mitsuba signals a failed sample by weight 0 with any pdf, as its own chi-square test assumes. However, a
-            # direction sampled with the density that `pdf` returns is a valid sample, even if nothing is reflected.
-            # Inside a mix, weight 0 may also be a black lobe toward a direction in which the other material reflects.
-            stated = self.bsdf.pdf(ctx, si, bs.wo, self._active)
-            failed = dr.all(weight == 0.0) & ~((pdf > 0.0) & (dr.abs(stated - pdf) < 1e-3 * pdf))
+            # direction in which nothing is reflected, sampled with the density that `pdf` returns, is a valid sample.
+            # Where something is reflected, weight 0 is a lobe's sample on the wrong side of the surface, or a black
+            # lobe of a mix.
+            stated, value = (call(ctx, si, bs.wo, self._active) for call in (self.bsdf.pdf, self.bsdf.eval))
+            black = dr.all(mi.unpolarized_spectrum(value) == 0.0) & (dr.abs(stated - pdf) < 1e-3 * pdf)
+            failed = dr.all(weight == 0.0) & ~((pdf > 0.0) & black)
             pdf, delta = dr.select(failed, 0.0, pdf), delta & ~failed
         return Sample(bs.wo, _like(wo, weight), pdf, delta, bs.eta)
 

@@ -382,6 +382,14 @@ class MaterialParameter(Parameter):
             raise InputError(f"{type(value).__name__} given, a material expected", location, hint)
 
 
+def has_two_values(width: object) -> bool:
+    """Whether an unbound width has, or may have, different values along x and y."""
+    if backend.is_drjit(width):
+        return bool(backend.drjit().is_vector_v(width))
+    x, y = pair_of(width)
+    return x is not y and not (isinstance(x, int | float) and isinstance(y, int | float) and x == y)
+
+
 def pair_of(value: object, location: str = "") -> tuple[Value, Value]:
     """The two widths (along x, along y) of a value given by the user: one number twice, or the entries of a tuple.
 

@@ -36,6 +36,7 @@ from .kinds import IntegerParameter as IntegerParameter
 from .kinds import Material as Material
 from .kinds import Parameter as Parameter
 from .kinds import Value as Value
+from .kinds import has_two_values as has_two_values
 from .kinds import pair_of as pair_of
 
 # --------------------------------------------------------------------------- types for checkers and editors

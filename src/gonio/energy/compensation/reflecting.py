@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ...material import BSDF, Microsurface
-from ...material.parameters import pair_of
-from ...ops import backend, function, inset, lookup, maximum, minimum, ones_like, sqr, sqrt, where
+from ...material.parameters import has_two_values
+from ...ops import function, inset, lookup, maximum, minimum, ones_like, sqr, sqrt, where
 from ...ops.backend import Array
 from ...ops.types import Direction, Mode, Pair, Scalar, Spectrum
 from ...optics import frame
@@ -181,13 +181,7 @@ def _one_width(surface: Microsurface, width: Scalar) -> OneWidth:
 
 def has_two_widths(base: BSDF) -> bool:
     """Whether an unbound base has, or may have, two different widths, on which the code depends."""
-    surface = base.microsurface
-    if surface is None:
-        return False
-    if backend.is_drjit(surface.alpha):
-        return bool(backend.drjit().is_vector_v(surface.alpha))
-    x, y = pair_of(surface.alpha)
-    return x is not y and not (isinstance(x, int | float) and isinstance(y, int | float) and x == y)
+    return base.microsurface is not None and has_two_values(base.microsurface.alpha)
 
 
 class Azimuth(NamedTuple):

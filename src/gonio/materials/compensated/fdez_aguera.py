@@ -50,11 +50,6 @@ class FdezAguera(_Compensated):
     }
     _takes_glass: ClassVar[bool] = False
 
-    @property
-    def lossless_tolerance(self) -> float:  # type: ignore[override]
-        """The loss allowed in a white furnace: the error of the tables."""
-        return 0.01 if self.anisotropic else 2e-3
-
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """f_base + F_ms E_ms / pi, times cos theta_i."""

@@ -12,7 +12,7 @@ from ...energy.compensation.missing import missing_energy
 from ...material import KnownViolation, choice, method
 from ...ops import Direction, Mode, Scalar, Spectrum, abs, backend, function
 from ...optics.fresnel.artist import AVERAGES
-from ._compensated import _Compensated, lobe_ratio
+from ._compensated import GAIN_OF_TWO_WIDTHS, _Compensated, lobe_ratio
 
 COLORS = {
     "sheet": "F_avg E_avg / (1 - F_avg (1 - E_avg)), as in the homework and the talk",
@@ -72,6 +72,7 @@ class KullaConty(_Compensated):
     color: str = choice(default="bounce", doc="color of the compensation", choices=COLORS)
     average: str = choice(default="exact", doc="how F_avg of a conductor or dielectric is computed", choices=AVERAGES)
     _takes_any = True
+    _loss = 1e-3
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -121,13 +122,13 @@ class KullaConty(_Compensated):
     }
 
     @property
-    def lossless_tolerance(self) -> float:  # type: ignore[override]
+    def lossless_tolerance(self) -> float | None:  # type: ignore[override]
         """The loss allowed in a white furnace: the error of the polynomials or the computed albedo (docs/energy.md)."""
         if self.base.transmits and self.anisotropic:
             return 0.2
         if self.base.transmits:
             return 0.015  # near eta = 1.02; 4e-3 from 1.1 on, 2e-3 from 1.3 on
-        return 0.01 if self.anisotropic else 1e-3
+        return super().lossless_tolerance
 
 
 def _furnace_error(model: KullaConty) -> float:
@@ -135,7 +136,7 @@ def _furnace_error(model: KullaConty) -> float:
     indices of the two sides differ by less than 6 %, the lobe is narrower than the steps of the table, which increases
     the error. Anisotropic glass is approximated by isotropic tables (`curves.widths_along`)."""
     if not model.base.transmits:
-        return 0.008 if model.anisotropic else 0.0
+        return GAIN_OF_TWO_WIDTHS if model.anisotropic else 0.0
     if model.anisotropic:
         return 0.15  # 0.02 from outside if one width is up to four times the other
     surface = model.base.microsurface

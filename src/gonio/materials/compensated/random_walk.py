@@ -27,6 +27,7 @@ class RandomWalk(_Compensated):
     """
 
     stochastic: ClassVar[bool] = True
+    _loss: ClassVar[float | None] = None
     seed: Number = number(default=0.0, doc="seed of the random numbers")
 
     def __post_init__(self) -> None:

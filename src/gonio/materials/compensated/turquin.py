@@ -40,11 +40,6 @@ class Turquin(_OnBase):
     }
     _takes_glass: ClassVar[bool] = False
 
-    @property
-    def lossless_tolerance(self) -> float:  # type: ignore[override]
-        """The loss allowed in a white furnace: the error of the tables."""
-        return 0.01 if self.anisotropic else 2e-3
-
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:

@@ -26,7 +26,7 @@ from ...material import (
 )
 from ...material import width as width_parameter
 from ...material.bsdf import Delta
-from ...material.parameters import pair_of
+from ...material.parameters import has_two_values
 from ...ops import Direction, Mode, Pair, Scalar, Spectrum, clamp, exp, function, inv_pi, maximum, mean, sqr, where
 from ...optics import frame, fresnel
 from ...optics.fresnel import exact
@@ -298,6 +298,4 @@ def _gain(model: Coat) -> float:
     1.1 to 2.5, widths of the top from 0.0015 to 0.5 and of the base below 0.02, plus a third of it."""
     if microfacet.delta_of(model.alpha) == "always":
         return 0.0
-    x, y = pair_of(model.alpha)
-    one = x is y or (isinstance(x, int | float) and isinstance(y, int | float) and x == y)
-    return 0.004 if one else 0.03
+    return 0.03 if has_two_values(model.alpha) else 0.004
