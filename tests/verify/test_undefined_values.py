@@ -36,3 +36,9 @@ class SingularLobe(go.Lambert):
 def test_an_integral_that_is_far_too_large_ends() -> None:
     energy = verify(SingularLobe(0.5), quick=True, law="energy")["energy"]
     assert energy.failed and "gain" in energy.why[1], energy.why
+
+
+def test_values_that_no_picture_shows_may_be_0_in_float32() -> None:
+    from mutants.sixth.r1_classic import R1TinyNumbers
+
+    assert verify(R1TinyNumbers(), quick=True, law="precision").passed

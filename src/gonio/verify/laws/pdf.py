@@ -119,6 +119,12 @@ class Pdf(Law):
         # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are equal
         views = [view for side, view in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
         oblique = directions.single(np.array([directions.at(*pair) for pair in views]).reshape(-1, 3))
+        for view in oblique[oblique[:, 2] > 0.0][:, None]:
+            if _reused(there, view, seed):
+                yield Cause(
+                    "does u.x select both the lobe and its direction, without being remapped to [0, 1) in between?",
+                    "u.x twice",
+                )
         oblique_tests = _chi_square(there, FEW, seed, oblique)
         for explain in (crowding.named, mixture.named, misplaced.named):
             for tested in oblique_tests:
@@ -132,12 +138,6 @@ class Pdf(Law):
             clamped = _clamped(there, view, seed)
             if clamped:
                 yield Cause(f"{clamped}: a clamped random number, which the pdf does not account for?", "u clamped")
-        for view in above[:, None]:
-            if _reused(there, view, seed):
-                yield Cause(
-                    "does u.x select both the lobe and its direction, without being remapped to [0, 1) in between?",
-                    "u.x twice",
-                )
         for note in finding.notes:
             if note.startswith(UNUSED):
                 yield Cause(note, "pdf where no samples are generated")
