@@ -13,7 +13,11 @@ si.sh_frame, si.n, si.uv = mi.Frame3f([1, 0, 0], [0, 1, 0], [0, 0, 1]), [0, 0, 1
 si.dp_du, si.dp_dv, si.t, si.prim_index = [1, 0, 0], [0, 1, 0], 1, 0
 si.wi = mi.Vector3f(0.939692616, 0.342020154, 0)
 wo = mi.Vector3f(0, 0, 1)
-bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
-values = [bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf]
+def number():
+    u, v = rng.next_float32(), rng.next_float32()
+    return dr.select(v < 0.2, 0, dr.select(v < 0.4, 0.99999994, u))
+bs, weight = bsdf.sample(ctx, si, number(), mi.Point2f(number(), number()))
+values = bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf
 good = [dr.all(dr.isfinite(v) & (v >= 0), axis=None) for v in values]
-assert dr.all(good, axis=None), f"valid values of eval, pdf, weight, pdf of the sample: {good}"
+good.append(dr.all(dr.isfinite(bs.wo), axis=None))
+assert dr.all(good, axis=None), f"valid eval, pdf, weight, pdf and direction of the sample: {good}"
