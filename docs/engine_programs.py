@@ -1,6 +1,6 @@
-"""The programs that show findings of the cards without Gonio, run in Chromium with the engine's own package.
+"""Run the programs that reproduce findings of the cards without Gonio, in Chromium, with the engine's own package.
 
-printed(package, "three-furnace.html")     the lines that the page shows
+printed(package, "three-furnace.html")     the text that the page displays
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from playwright.sync_api import sync_playwright
 
 PROGRAMS = Path(__file__).parent / "report-cards" / "engines" / "programs"
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-LIMIT = 600_000.0  # ms of a program
+LIMIT = 600_000.0  # time limit of a program, in ms
 
 
 class _Files(http.server.SimpleHTTPRequestHandler):
     def log_message(self, *_args: Any) -> None:
-        """Nothing: the server is asked for some hundred modules."""
+        """Print nothing, because a page requests hundreds of modules."""
 
 
 def printed(package: Package, program: str) -> str:
-    """What a program shows, served from a folder with node_modules as its first lines say."""
+    """Output of a program, which is served from a folder with node_modules, as its instructions require."""
     with tempfile.TemporaryDirectory(prefix="gonio-program-") as folder:
         place = Path(folder, "node_modules", package.name)
         place.parent.mkdir(parents=True)

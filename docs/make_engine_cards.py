@@ -1,18 +1,18 @@
-"""Write docs/report-cards/engines/: the verdicts on the shaders of engines, from npm packages that the user provides.
+"""Write docs/report-cards/engines/: the verdicts on engines' shaders, from packages that the user provides.
 
     python docs/make_engine_cards.py PACKAGES [--only three,...]     measure, store cards.json, write pages and pictures
     python docs/make_engine_cards.py [--check]                       write pages from cards.json, or compare them
-    python docs/make_engine_cards.py --pictures                      draw the pictures too
-    python docs/make_engine_cards.py PACKAGES --programs             run the programs without Gonio; store their output
+    python docs/make_engine_cards.py --pictures                      draw the pictures, too
+    python docs/make_engine_cards.py PACKAGES --programs             run programs/*.html; store their output
 
 PACKAGES is a folder with one folder per release, each with its package.json, such as three-0.185.1 and three-0.187.0:
 
     npm pack three@0.187.0 && mkdir three-0.187.0 && tar xzf three-0.187.0.tgz -C three-0.187.0 --strip-components=1
 
-An engine that is not on npm has a folder PAGE-VERSION: bevy-0.19.0, a checkout; materialx-1.39.5, the shaders that
-programs/materialx_generate.py wrote.
+For an engine that is not on npm, the folder is named PAGE-VERSION: bevy-0.19.0 is a checkout, and materialx-1.39.5
+contains the shaders written by programs/materialx_generate.py.
 
-docs/engine_cases declares what is measured of each engine, and the causes of failures.
+docs/engine_cases declares the measurements for each engine and the causes of its failures.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ import matplotlib.pyplot as plt
 FOLDER = Path(__file__).parent / "report-cards" / "engines"
 STORED = FOLDER / "cards.json"
 SEED = 1
-OVERVIEW = """These cards show how the shaders of rendering engines perform in the tests of
-[`gonio verify`](../../verify.md) and in white furnaces. Gonio contains no source code from the engines: given a package
-or a checkout, `gonio adopt` writes a program that includes the engine's own files
-([how this works](../../shaders.md#engines)). Each page states the size of every failure, its cause down to the function
-or table, and how to reproduce it, for several engines also without Gonio. The tests check the laws that a path tracer
-relies on: a rasterizer need not be reciprocal, and several causes are deliberate design choices. Corrections are
-welcome. There is no card for Filament, because its npm package contains compiled materials, from which the compiler has
-removed the source code.
+OVERVIEW = """These cards report how the shaders of rendering engines perform in
+[`gonio verify`](../../verify.md) and in white-furnace tests. Gonio contains no source code from the engines: given a
+package or a checkout, `gonio adopt` writes a program that includes the engine's own files
+([how this works](../../shaders.md#engines)). Each card states the size of every failure, the function or table that
+causes it, and the commands that reproduce it. Several cards also link to a program that reproduces white-furnace
+results without Gonio. The tests check laws that a path tracer relies on. A rasterizer need not be reciprocal, and
+several causes are deliberate design choices. Corrections are welcome. There is no card for Filament, because its npm
+package contains only compiled materials, without their source code.
 """
 
 
@@ -57,7 +57,7 @@ removed the source code.
 
 
 def releases(packages: Path, only: set[str]) -> dict[str, list[shaders.Package]]:
-    """The packages in a folder by name, each with its releases in order."""
+    """Packages in a folder, keyed by name, with their releases in order."""
     found: dict[str, list[shaders.Package]] = {}
     for one in sorted([*packages.glob("*/package.json"), *packages.glob("@*/*/package.json")]):
         try:
@@ -79,7 +79,7 @@ def _order(version: str) -> list[int]:
 
 
 def measured(engine: Engine, package: shaders.Package) -> dict[str, Any]:
-    """All measured values of a release."""
+    """Everything that is measured for one release."""
     with tempfile.TemporaryDirectory(prefix="gonio-engine-") as place:
         folder = Path(place)
         if engine.made:
@@ -114,7 +114,7 @@ def _judged(folder: Path, name: str, laws: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _settings(why: list[str]) -> list[tuple[str, str]]:
-    """The parameter values in the text of a verdict, "at rough = 0, metal = 0: ..."."""
+    """Parameter values stated in the text of a verdict, such as "at rough = 0, metal = 0: ..."."""
     match = re.match(r"at ((?:\w+ = [\d.e+-]+(?:, )?)+):", why[0]) if why else None
     return re.findall(r"(\w+) = ([\d.e+-]+)", match[1]) if match else []
 
@@ -127,7 +127,7 @@ def _size(v: Verdict) -> str:
 
 
 def run_programs(packages: list[shaders.Package]) -> None:
-    """Store what the programs without Gonio print for each release."""
+    """Run the programs that do not use Gonio, and store their output for each release."""
     from engine_programs import PROGRAMS, printed
 
     for package in packages:
@@ -141,13 +141,13 @@ def run_programs(packages: list[shaders.Package]) -> None:
 
 
 def cause(engine: Engine, name: str, law: str, version: str, figures: dict[str, float]) -> str:
-    """The cause of a failure, with measured values of the trials, or "unknown"."""
+    """Cause of a failure, with measured values of the trials filled in, or "unknown"."""
     text = engine.causes.get((name, law, version)) or engine.causes.get((name, law))
     return text.format_map(figures) if text else "unknown."
 
 
 def page(engine: Engine, results: dict[str, Any]) -> str:
-    """The page of an engine, from stored values only."""
+    """Report card of an engine, from stored values only."""
     versions = list(results)
     last = results[versions[-1]]
     shown = " and ".join(versions)
@@ -155,15 +155,17 @@ def page(engine: Engine, results: dict[str, Any]) -> str:
     lines = [
         f"# {engine.title}",
         "",
-        f"{source}; [repository]({engine.home}).",
-        "Generated by `python docs/make_engine_cards.py`; all numerical results are in [cards.json](cards.json).",
+        f"Tested: {source}. Source code: [repository]({engine.home}).",
+        "This page is generated by `python docs/make_engine_cards.py`; [cards.json](cards.json) contains all measured "
+        "values.",
         "",
         engine.intro,
         "",
         "## White furnace",
         "",
-        "These tables give the albedo of white materials (all color factors set to 1) at five roughnesses and six",
-        "angles. The ideal value is 1; lower values mean that light is lost, higher values that it is gained.",
+        "The tables give the albedo of white materials (all color factors set to 1) for five values of roughness and",
+        "six of n.v, the cosine of the view angle. The ideal albedo is 1: a lower value is a loss of energy, a higher",
+        "value a gain.",
         "",
         f"![White furnaces of {engine.title}]({engine.page}.png)",
     ]
@@ -197,8 +199,11 @@ def _failures(engine: Engine, results: dict[str, Any]) -> list[str]:
     only = f" Only {', '.join(laws[:-1])} and {laws[-1]} were tested." if engine.laws else ""
     lines = [
         _wrapped(
-            f"These are the results of `gonio verify --quick` with seed {SEED}, at the default values and over the "
-            f"full parameter ranges.{only} The grades are explained [here](../../verify.md#severity-of-a-failure)."
+            f"The table gives the verdicts of `gonio verify --quick` with seed {SEED}, at the default parameter values "
+            f"and over the full parameter ranges.{only} A failure is shown by its "
+            "[grade](../../verify.md#severity-of-a-failure); a hyphen means that the law does not apply. For each "
+            "failure, the list below the table gives the measured value, the effect, the parameter values if they "
+            "differ from the defaults, and the cause. Directions are given as theta, phi in degrees."
         ),
         "",
         f"| material | release | {' | '.join(laws)} |",
@@ -217,7 +222,7 @@ def _failures(engine: Engine, results: dict[str, Any]) -> list[str]:
                 if one["status"] == "fail":
                     at = f" ({one['at']})" if one["at"] else ""
                     why = cause(engine, name, law, version, result["trials"])
-                    words = f"- **{law}**, {version}: {one['shown']}; {one['size']}{at}. Cause: {why}"
+                    words = f"- **{law}**, {version}: {one['shown']}. Effect: {one['size']}{at}. Cause: {why}"
                     lines.append(_wrapped(words, "  "))
         lines += ["All laws hold."] if len(lines) == count else []
     return lines
@@ -245,9 +250,9 @@ def _again(engine: Engine, version: str) -> list[str]:
         outputs = ", ".join(f"[{one.stem}](programs/{one.name})" for one in printed)
         lines += [
             "",
-            f"{links} reproduces white-furnace results without Gonio; instructions are at the top of the file.",
+            f"{links} reproduces white-furnace results without Gonio; the file begins with instructions.",
         ]
-        lines += [f"Its output: {outputs}."]
+        lines += [f"Its output is stored in {outputs}."]
     return lines
 
 
@@ -261,12 +266,13 @@ def _wrapped(text: str, indent: str = "") -> str:
 
 
 def overview(stored: dict[str, Any]) -> str:
-    """The list of engines."""
+    """The overview page, with one row per engine."""
     lines = [
-        "# Report cards of engines",
+        "# Engine report cards",
         "",
         *OVERVIEW.split("\n"),
-        "| engine | releases | white metal, roughness 1, n.v 1 | largest gain of a white furnace | laws that fail |",
+        "| engine | release | albedo of white metal at roughness 1 and n.v 1 | largest energy gain (albedo - 1) "
+        "| violated laws |",
         "|---|---|---|---|---|",
     ]
     for name, results in stored.items():
@@ -280,7 +286,9 @@ def overview(stored: dict[str, Any]) -> str:
         )
     lines += [
         "",
-        "The models of the BRDF Explorer, which is not a rendering engine, have their own [page](brdf-explorer.md).",
+        "n.v is the cosine of the view angle. The energy gain is the largest in any furnace of the newest release.",
+        "",
+        "The BRDF Explorer is not a rendering engine; its models have [their own card](brdf-explorer.md).",
     ]
     return "\n".join(lines) + "\n"
 
@@ -289,7 +297,10 @@ def overview(stored: dict[str, Any]) -> str:
 
 
 def picture(engine: Engine, results: dict[str, Any], path: Path) -> None:
-    """Draw all furnaces of an engine: a row per furnace, a column per release; blue loses light, red gains it."""
+    """Draw all white furnaces of an engine, one row per furnace and one column per release.
+
+    Blue cells lose energy, red cells gain it.
+    """
     columns, rows = len(results), len(engine.furnaces)
     figure, axes = plt.subplots(rows, columns, figsize=(5.2 * columns + 0.8, 3.2 * rows + 0.4), squeeze=False,
                                 constrained_layout=True)  # fmt: skip
@@ -321,19 +332,19 @@ def picture(engine: Engine, results: dict[str, Any], path: Path) -> None:
 
 
 def written(stored: dict[str, Any]) -> dict[Path, str]:
-    """All pages by path."""
+    """All pages, keyed by path."""
     pages = {FOLDER / f"{engines()[name].page}.md": page(engines()[name], one) for name, one in stored.items()}
     return {FOLDER / "README.md": overview(stored), **pages}
 
 
 def main() -> int:
-    """Measure, and write or check the pages; returns the exit code."""
+    """Measure if packages are given, write or check the pages, and return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("packages", nargs="?", type=Path)
     parser.add_argument("--only", default="")
     parser.add_argument("--check", action="store_true")
-    parser.add_argument("--programs", action="store_true", help="run the programs without Gonio, in Chromium")
-    parser.add_argument("--pictures", action="store_true", help="draw the stored figures again")
+    parser.add_argument("--programs", action="store_true", help="run the programs that do not use Gonio, in Chromium")
+    parser.add_argument("--pictures", action="store_true", help="redraw the pictures from the stored values")
     options = parser.parse_args()
     stored: dict[str, Any] = json.loads(STORED.read_text(encoding="utf-8")) if STORED.is_file() else {}
     only = set(filter(None, options.only.split(",")))

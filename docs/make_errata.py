@@ -1,6 +1,6 @@
-"""Write docs/errata.md: public threads that question a material, each with values that answer it, computed here.
+"""Write docs/errata.md: public threads that question a material, each answered with values that are computed here.
 
-python docs/make_errata.py [--check]      --check writes nothing and fails if a value differs from the page's
+python docs/make_errata.py [--check]      --check writes nothing and fails if a value differs from that on the page
 """
 
 from __future__ import annotations
@@ -15,24 +15,26 @@ from gonio import ops
 from book.generated import written
 
 PAGE = Path(__file__).parent / "errata.md"
-HEAD = """# Errata of the field
+HEAD = """# Questions from public threads
 
-In the public threads below, somebody doubts a material, a table or a density; Gonio answers with computed values.
-`python docs/make_errata.py` computes the numbers after **Computed**, and a test compares them with this page. Columns
-headed "thread" quote the thread. Threads for which nothing was computed are not listed. The programs that the threads
-discuss were not run here, except for the [report cards of engines](report-cards/engines/README.md). Findings about
-Mitsuba's plugins, each with a program that needs only Mitsuba, are on the [report cards](report-cards/README.md).
+Each section of this page summarizes a question that was raised in a public thread about a material, a table or a pdf,
+and answers it with values computed by Gonio. `python docs/make_errata.py` computes the numbers after **Computed**, and
+a test compares them with this page. Values "as reported" are quoted from the thread. Threads for which nothing was
+computed are not listed. The programs that the threads discuss were not run for this page; the
+[engine report cards](report-cards/engines/README.md) contain tests of several of them. The
+[report cards](report-cards/README.md) list the failures of Mitsuba's plugins, each with a program that needs only
+Mitsuba.
 """
 SEED = 1
 
 
 def white(roughness: float, **parameters: object) -> go.Metal:
-    """A metal that reflects everything, given the perceptual roughness of shaders."""
+    """A metal with F = 1, from the perceptual roughness that shaders use."""
     return go.Metal(r0=1.0, edge=1.0, alpha=roughness * roughness, **parameters)
 
 
 def furnace(material: go.BSDF, cosines: Sequence[float]) -> np.ndarray:
-    """Albedo of the first channel at each cosine."""
+    """Directional albedo of the first channel at each cosine of the view angle."""
     return np.asarray(go.albedo(material, mu=list(cosines)).value)[..., 0]
 
 
@@ -55,18 +57,19 @@ def three_turquin() -> str:
             ]
         )
     headings = [
-        *("roughness", "n.v", "single scattering", "thread: before", "fraction of the loss recovered", "thread: after"),
-        *("`turquin`", "`kulla-conty`"),
+        *("roughness", "n.v", "single scattering", "before, as reported", "fraction of the loss recovered"),
+        *("after, as reported", "`turquin`", "`kulla-conty`"),
     ]
-    return f"""A multiplicative term that cites Turquin recovered "less than half" of the light that single scattering
-loses. It was replaced by the formula of the paper. **Computed** albedo in a white furnace at F = 1:
+    return f"""A compensation term that was attributed to Turquin recovered "less than half" of the light that single
+scattering loses. It was replaced by the formula of Turquin's paper. **Computed** albedo in a white furnace at F = 1:
 
 {table(headings, rows)}
 
-The thread's values of single scattering are confirmed. With an exact E, the formula of the paper gives 1 everywhere,
-because it multiplies the lobe by 1 / E. If the new term does the same with a tabulated E, the table is too large by 6 %
-and 12 % in the last two rows. It is indeed too large; the [report card of three.js](report-cards/engines/three.md)
-shows where, and how to fix the table. Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
+The thread's values of single scattering are confirmed. The formula of the paper multiplies the lobe by 1 / E; with an
+exact E, it therefore gives 1 everywhere. If the new term does the same with a tabulated E, the values in the table are
+too large by 6 % and 12 % in the last two rows. The [report card of three.js](report-cards/engines/three.md) confirms
+that they are too large, and shows how to correct the table.
+Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
 
 
 def blended_metalness() -> str:
@@ -78,7 +81,7 @@ def blended_metalness() -> str:
         a, b = dfg[row, column]
 
         def lobe(f0: float, a: float = a, b: float = b) -> float:
-            """Single scattering plus the multiple scattering of Fdez-Aguera, under uniform white light."""
+            """Albedo of single scattering plus Fdez-Aguera's term for multiple scattering, in a white furnace."""
             single, lost, average = f0 * a + b, 1.0 - a - b, f0 + (1.0 - f0) / 21.0
             return single + single * average / (1.0 - lost * average) * lost
 
@@ -86,12 +89,12 @@ def blended_metalness() -> str:
         single = 0.52 * a + b
         rows.append([f"{x:.3f}" for x in (roughness[row], mu[column], single, together, apart)])
     return f"""A material is half metal (F0 = 1) and half dielectric (F0 = 0.04). Should F0 be blended before the
-compensation, or should each half be compensated before the two are blended? Single scattering is linear in F0, but the
-compensation is not. **Computed** albedo of the specular lobe, from Gonio's split-sum table:
+compensation, or should the lobes of both halves be compensated before they are blended? Single scattering is linear in
+F0, but the compensation is not. **Computed** albedo of the specular lobe, from Gonio's split-sum table:
 
-{table(["roughness", "n.v", "single scattering", "F0 blended first", "each compensated, then blended"], rows)}
+{table(["roughness", "n.v", "single scattering", "F0 blended first", "lobes compensated first"], rows)}
 
-If F0 is blended first, the lobe loses the difference in a white furnace.
+If F0 is blended first, the difference between the last two columns is lost in a white furnace.
 
 Try it: `gonio bake ggx --lut dfg -o tables`."""
 
@@ -108,9 +111,9 @@ def added_lobes() -> str:
     return f"""If a white diffuse lobe and a dielectric reflection of F0 = 0.04 are simply added, more light leaves
 than arrives. **Computed** albedo at roughness {roughness[row]:.3f}:
 
-{table(["n.v", "sum of the lobes", "sum with the diffuse lobe scaled by one minus the albedo of the reflection"], rows)}
+{table(["n.v", "plain sum", "diffuse lobe scaled by 1 minus the specular albedo"], rows)}
 
-The second form conserves energy, but its scale factor depends only on the view direction, so it is not reciprocal.
+The scaled sum conserves energy but is not reciprocal, because its scale factor depends only on the view direction.
 `coat` and `openpbr` (without fuzz) are reciprocal; `coat` conserves energy, and `openpbr` does so approximately
 ([energy](energy.md), [OpenPBR](openpbr.md))."""
 
@@ -119,8 +122,8 @@ def split_sum() -> str:
     baked = go.bake("ggx", lut=["dfg"], resolution=64)
     worst = baked.manifest["error"]["dfg"]["max"]
     a, b = baked.arrays["dfg"][32, 32]
-    return f"""How is a table of the split sum computed? `gonio bake ggx --lut dfg --resolution 256 -o tables` writes it
-as .npz, .exr and .png, together with its error. **Computed** for 64 texels per axis: the largest error of an entry is
+    return f"""How is a split-sum table computed? `gonio bake ggx --lut dfg --resolution 256 -o tables` writes the table
+as .npz, .exr and .png files and states its error. **Computed** for 64 texels per axis: the largest error of an entry is
 {worst:.1e}; in the middle (roughness and n.v 0.508), A = {a:.4f} and B = {b:.4f}. [Energy](energy.md) gives the errors
 of tables that are computed by sampling."""
 
@@ -143,16 +146,16 @@ def bounded_normals() -> str:
         above = float(np.mean((np.asarray(sample.wi)[:, 2] > 0) & (weight > 0)))
         rows.append([f"`{sampling}`", f"{integral:.2f}", f"{above:.2f}", f"{weight.mean():.2f}", f"{weight.std():.2f}"])
     headings = [
-        *("sampling", "integral of the pdf above the surface", "fraction of samples above"),
-        *("mean weight", "its standard deviation"),
+        *("sampling", "integral of the pdf above the surface", "fraction of samples above the surface"),
+        *("mean weight", "standard deviation of the weight"),
     ]
     return f"""What is the density of bounded visible normals (Eto2023)? It is D divided by the area of the sampled part
-of the cap: `bounded_per_cosine` in `optics/ndf/ggx.py`. The pdf is right if its integral equals the fraction of samples
-that land above the surface. **Computed** for GGX with alpha = 0.8, viewed at 1.3 rad from the normal:
+of the cap: `bounded_per_cosine` in `optics/ndf/ggx.py`. The pdf is correct only if its integral equals the fraction of
+samples above the surface. **Computed** for GGX with alpha = 0.8, at a view angle of 1.3 rad:
 
 {table(headings, rows)}
 
-Both have the same mean weight, the albedo; bounded sampling wastes fewer samples. Try it:
+Both methods have the same mean weight, which is the albedo, but bounded sampling wastes fewer samples. Try it:
 `gonio verify metal -p sampling=bounded --law pdf`."""
 
 
@@ -168,7 +171,7 @@ def film_in_transmission() -> str:
         transmitted = np.mean(weight * ~up, axis=0) * 1.5**2  # power: in the glass, radiance is higher by eta^2
         show = [" ".join(f"{value:.2f}" for value in one) for one in (reflected, transmitted, reflected + transmitted)]
         rows.append([f"{thickness:g} nm", *show])
-    return f"""A thin film must also color the transmitted light, because what is not reflected is transmitted.
+    return f"""A thin film must also color the transmitted light, because light that is not reflected is transmitted.
 **Computed** for a film of index 2 on glass of index 1.5, at 0.6 rad, in red, green and blue:
 
 {table(["film", "reflected", "transmitted", "sum"], rows)}
@@ -183,11 +186,11 @@ def reciprocal_coat() -> str:
     there, back = (np.asarray(coat.f(*pair, precision="float64"))[:, 0] for pair in ((wo, wi), (wi, wo)))
     worst = float(np.max(abs(there - back) / np.maximum(there, 1e-9)))
     white_coat = furnace(coat, [0.1, 0.5, 1.0])
-    return f"""Must a coat that conserves energy give up reciprocity? **Computed** for Gonio's `coat` over a white
-Lambertian base: when the directions are swapped, f changes by at most {_below(worst)} of its value (2,000 pairs), and
+    return f"""Is a coat that conserves energy necessarily nonreciprocal? **Computed** for Gonio's `coat` over a white
+Lambertian base: if the directions are swapped, f changes by at most {_below(worst)} of its value (2,000 pairs), and
 the albedo in a white furnace is
-{", ".join(f"{value:.3f}" for value in white_coat)} at cosines of 0.1, 0.5 and 1.
-Both properties hold, because the tables of the layers depend on both directions. Try it:
+{", ".join(f"{value:.3f}" for value in white_coat)} for n.v = 0.1, 0.5 and 1.
+The coat has both properties, because its layer tables depend on both directions. Try it:
 `gonio verify coat -p base=lambert --law reciprocity`."""
 
 
@@ -198,15 +201,15 @@ def _hemisphere(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def _below(value: float) -> str:
-    """An upper bound that does not depend on the last bits."""
+    """An upper bound on a value that does not depend on rounding errors."""
     return next(f"{bound:g}" for bound in (1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0) if value <= bound)
 
 
 class NeubeltSheen(go.BSDF):
-    """Charlie's distribution (Estevez2017) with Neubelt's visibility, as glTF's KHR_materials_sheen proposes it."""
+    """Charlie's distribution (Estevez2017) with Neubelt's visibility, as in glTF's KHR_materials_sheen."""
 
     color: go.Colour = go.spectrum(1.0, doc="Color of the sheen.")
-    alpha: go.Number = go.number(0.25, low=0.01, high=1.0, doc="Width: the square of the roughness.")
+    alpha: go.Number = go.number(0.25, low=0.01, high=1.0, doc="Width of the lobe, the square of the roughness.")
 
     def eval(self, wo, wi, mode="radiance"):  # type: ignore[no-untyped-def]
         h = ops.normalize(wo + wi)
@@ -223,9 +226,9 @@ def sheen() -> str:
         values = _quadrature(NeubeltSheen(alpha=roughness**2), cosines)
         rows.append([f"{roughness:g}", *(f"{value:.3f}" for value in values)])
     headings = ["roughness", *(f"n.v = {cosine:g}" for cosine in cosines)]
-    return f"""A fitted curve for the albedo of sheen was off by 62 % on average, and was fitted again.
-**Computed** values to fit, for a white sheen color, from the formula as a short material (`NeubeltSheen` in
-`docs/make_errata.py`):
+    return f"""A curve that was fitted to the albedo of sheen had an average error of 62 % and was fitted again.
+**Computed** albedo of white sheen, to which such a curve can be fitted (`NeubeltSheen` in `docs/make_errata.py`
+implements the formula as a short material):
 
 {table(headings, rows)}
 
@@ -234,7 +237,7 @@ uses the masking term of Estevez2017 instead."""
 
 
 def _quadrature(material: go.BSDF, cosines: Sequence[float]) -> list[float]:
-    """Albedo by a product rule, which suits a smooth broad lobe."""
+    """Albedo by a product quadrature rule, which is accurate for a smooth, broad lobe."""
     nodes, weights = np.polynomial.legendre.leggauss(200)
     z, phi = (nodes + 1) / 2, (np.arange(200) + 0.5) / 200 * 2 * np.pi
     zz, pp = np.meshgrid(z, phi, indexing="ij")
@@ -250,18 +253,18 @@ def _quadrature(material: go.BSDF, cosines: Sequence[float]) -> list[float]:
 
 THREADS: dict[str, tuple[str, Callable[[], str]]] = {
     "Rough metals are too dark": ("mrdoob/three.js#33983 mrdoob/three.js#32072", three_turquin),
-    "Between metal and dielectric": ("mrdoob/three.js#32190 bevyengine/bevy#23818", blended_metalness),
-    "Diffuse and specular, added": ("google/filament#10140", added_lobes),
+    "Partly metallic materials": ("mrdoob/three.js#32190 bevyengine/bevy#23818", blended_metalness),
+    "Adding diffuse and specular lobes": ("google/filament#10140", added_lobes),
     "The albedo of sheen": ("mrdoob/three.js#32397 mrdoob/three.js#32356", sheen),
-    "A table of the split sum": ("lzhnb/GS-IR#19", split_sum),
+    "Computing a split-sum table": ("lzhnb/GS-IR#19", split_sum),
     "The density of bounded visible normals": ("nvpro-samples/nvpro_core#74", bounded_normals),
-    "A thin film, transmitted": ("AcademySoftwareFoundation/MaterialX#3026", film_in_transmission),
-    "Reciprocity or energy": ("adobe/openpbr-bsdf#30", reciprocal_coat),
+    "Thin films and transmitted light": ("AcademySoftwareFoundation/MaterialX#3026", film_in_transmission),
+    "Reciprocity and energy conservation": ("adobe/openpbr-bsdf#30", reciprocal_coat),
 }
 
 
 def section(title: str) -> str:
-    """A thread with its answer, in Markdown."""
+    """The Markdown section of a topic: its threads, and the answer."""
     threads, answer = THREADS[title]
     links = []
     for thread in threads.split():
@@ -271,7 +274,7 @@ def section(title: str) -> str:
 
 
 def main() -> int:
-    """Write or check the page; returns the exit code."""
+    """Write or check the page, and return the exit code."""
     text = "\n".join([HEAD, *map(section, THREADS)])
     return written(PAGE, text, "run this script")
 

@@ -1,4 +1,4 @@
-"""Write docs/models/NAME.md for every model, the page that `gonio explain` prints, and the tables of README files.
+"""Write docs/models/NAME.md for every model, which `gonio explain` prints, and the tables in the README files.
 
 python docs/make_pages.py [--check] [--tables]   --check writes nothing and fails if a page is out of date
                                                  --tables omits docs/models, which takes a minute
@@ -124,7 +124,8 @@ def _index() -> str:
 
 
 def _alike(old: str, new: str) -> bool:
-    """Whether two pages are equal, up to 10 % in the values of sampling quality, which vary with the processor."""
+    """Whether two pages are equal; the values of sampling quality may differ by 10 %, because they vary with the
+    processor."""
     *lines, last = old.splitlines()
     *new_lines, new_last = new.splitlines()
     figures = [float(number) for number in NUMBER.findall(last)]
@@ -140,9 +141,12 @@ def _sampling(title: str, found: quality.Quality | None) -> str:
     """A paragraph on how well a material samples itself."""
     if found is None:
         return ""
+    failed, variance, cosine, ideal = found.numbers
+    compared = f"{cosine} times that of cosine sampling and " if cosine else ""
     return (
-        f"\nSampling of `{title}`: {found.words.removeprefix('sampling: ')} "
-        "([how these are measured](../verify.md#sampling-quality)).\n"
+        f"\nSampling of `{title}`: {failed} of the samples fail, the relative variance of the weights is {variance}, "
+        f"and the efficiency is {compared}{ideal} of the ideal "
+        "([how these values are measured](../verify.md#sampling-quality)).\n"
     )
 
 

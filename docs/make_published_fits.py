@@ -1,10 +1,10 @@
-"""Write docs/published-fits.md, its pictures and cards.json: how accurate the published fits of the MERL materials are.
+"""Write docs/published-fits.md, its pictures and cards.json: tests of the published fits to the MERL materials.
 
     python docs/make_published_fits.py [--networks merl.npz] [--only FILE/FIT,...]
 
-merl.npz holds networks of 675 weights for 13 of the materials (Sztrajman2021): `NAME/kernel0..2`, `NAME/bias0..2`.
-Without it, or with --only, only the table on the terminal is written. Nothing is random: all fits are evaluated at the
-same points.
+merl.npz contains neural networks of 675 weights for 13 of the materials (Sztrajman2021), as `NAME/kernel0..2` and
+`NAME/bias0..2`. Without this file, or with --only, the program only prints a table. All fits are evaluated at the same
+fixed points.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ Array = NDArray[np.float64]
 BRDF = Callable[[Array, Array], Array]
 
 THETA = np.array([1.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 88.0, 89.5])  # viewing angles, degrees
-POINTS = 4096  # points of a rank-1 lattice per view, for albedos accurate to about a thousandth
-SIZE = 96  # pixels of a sphere whose differences are reported
-BALL, OVERSAMPLING = 136, 3  # pixels of a sphere on a sheet, and samples along each side of one
+POINTS = 4096  # lattice points (rank 1) per view, which make albedos accurate to about a thousandth
+SIZE = 96  # width in pixels of the spheres whose differences are reported
+BALL, OVERSAMPLING = 136, 3  # width in pixels of a sphere on a sheet, and samples along each side of a pixel
 SHEETS = 2  # number of sheets of spheres, among which the materials are divided
 LIGHTS = np.array([[-0.45, 0.55, 0.7], [0.9, 0.35, 0.25], [0.3, -0.75, -0.15]])  # key, rim, and from behind
 
 
 class Card(NamedTuple):
-    """One fit of one material.
+    """The measured values of one fit of one material.
 
-    gain      largest albedo of a channel over the views, minus 1; `at` is that view, in degrees
-    mean      energy gain averaged over all views, weighted by their cosine, in the worst channel
-    negative  fraction of the light that is negative, at the view where it is largest
-    recip     maximum of |f(o, i) - f(i, o)| relative to the larger value
+    gain      largest albedo of any channel at any view, minus 1; `at` is the angle of this view in degrees
+    mean      energy gain averaged over all views, weighted by their cosines, in the worst channel
+    negative  fraction of the light that is negative, at the view where this fraction is largest
+    recip     maximum of |f(o, i) - f(i, o)|, relative to the larger value
     cosine    variance of cosine sampling divided by that of the material's own sampling
     """
 
@@ -58,7 +58,7 @@ class Card(NamedTuple):
 
     @property
     def severity(self) -> float:
-        """Average error of a picture: gained light and negative light, plus a tenth of the gain at the worst view."""
+        """Average error of a picture: gained and negative light, plus a tenth of the gain at the worst view."""
         return self.mean + self.negative + 0.1 * max(self.gain, 0.0)
 
 
@@ -70,14 +70,14 @@ def unit(w: Array) -> Array:
 
 
 def polar(theta: Array, phi: Array | float) -> Array:
-    """Unit vectors of angles in radians."""
+    """Unit vectors from angles in radians."""
     theta, phi = np.broadcast_arrays(theta, phi)
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
 
 
 def rusinkiewicz() -> tuple[Array, Array]:
-    """(wo, wi) on a coarse grid in the coordinates of the MERL tables: theta_h at steps of its square root, theta_d and
-    phi_d evenly spaced; pairs below the surface are omitted."""
+    """(wo, wi) on a coarse grid in the coordinates of the MERL tables: evenly spaced in sqrt(theta_h), theta_d
+    and phi_d. Pairs below the surface are omitted."""
     half = (np.arange(24) + 0.5) ** 2 / 24**2 * np.pi / 2
     difference = (np.arange(12) + 0.5) / 12 * np.pi / 2
     turn = (np.arange(12) + 0.5) / 12 * np.pi
@@ -92,7 +92,7 @@ def rusinkiewicz() -> tuple[Array, Array]:
 
 
 def sphere(size: int) -> tuple[Array, Array, Array]:
-    """(mask of the ball's pixels, wo of each pixel, wi of each pixel and light), in the frames of the surface."""
+    """Mask of the ball's pixels, wo per pixel, and wi per light and pixel, in the local frames of the surface."""
     at = (np.arange(size) + 0.5) / size * 2.1 - 1.05
     x, y = np.meshgrid(at, -at)
     inside = x**2 + y**2 < 1.0
@@ -105,7 +105,7 @@ def sphere(size: int) -> tuple[Array, Array, Array]:
 
 
 def network(weights: dict[str, Array], name: str) -> BRDF:
-    """The network of a material: input half and difference vector, output exp(x) - 1, ReLU layers (Sztrajman2021)."""
+    """BRDF of a material's network: ReLU layers from the half and difference vectors to exp(x) - 1 (Sztrajman2021)."""
     layers = [(weights[f"{name}/kernel{i}"], weights[f"{name}/bias{i}"]) for i in range(3)]
 
     def f(wo: Array, wi: Array) -> Array:
@@ -143,7 +143,7 @@ def card(name: str, fit: str) -> Card:
     weight = np.where(drawn.pdf[:, None] > 0.0, drawn.weight, 0.0).reshape(len(THETA), POINTS, 3)
     albedo = weight.mean(1)
     row, _ = np.unravel_index(np.argmax(albedo), albedo.shape)
-    # trapezoidal rule in sin^2, whose differential is 2 cos sin dtheta
+    # trapezoidal rule in sin^2 theta, whose differential is 2 cos theta sin theta dtheta
     views = np.concatenate([[0.0], np.sin(np.radians(THETA)) ** 2, [1.0]])
     excess = np.maximum(albedo - 1.0, 0.0)
     excess = np.concatenate([excess[:1], excess, excess[-1:]])
@@ -165,18 +165,18 @@ def card(name: str, fit: str) -> Card:
 
 
 def mapped(brdf: BRDF) -> Array:
-    """Cube root of f cos theta_i on the grid, flattened; differences of it are roughly perceptually uniform."""
+    """Cube roots of f cos theta_i on the grid, flattened; their differences are roughly perceptually uniform."""
     wo, wi = GRID
     return np.cbrt(brdf(wo, wi) * wi[:, 2:]).ravel()
 
 
 def picture(brdf: BRDF) -> Array:
-    """The sphere under three lights of irradiance pi, as sRGB values 0 to 1, (pixels of the ball, 3)."""
+    """sRGB values, from 0 to 1, of a sphere under three lights of irradiance pi, with shape (pixels of the ball, 3)."""
     return encoded(radiance(brdf, EYE, TO_LIGHTS))
 
 
 def radiance(brdf: BRDF, eye: Array, to_lights: Array) -> Array:
-    """Radiance of the points of a sphere, from directions in their frames."""
+    """Radiance of points of a sphere, from directions in their local frames."""
     total = np.zeros((len(eye), 3))
     for wi in to_lights:
         lit = wi[:, 2] > 0.0
@@ -237,13 +237,13 @@ def summary(cards: list[Card]) -> str:
     header = (
         "fit",
         "model",
-        "fits",
-        "gain at some view",
-        "gain on average",
-        "largest albedo, at degrees",
-        "negative light",
+        "materials",
+        "energy gain at some view",
+        "energy gain on average",
+        "largest albedo, at view angle",
+        "negative values",
     )
-    return table((*header, "sampling x cosine, least / median"), rows)
+    return table((*header, "sampling efficiency, smallest / median"), rows)
 
 
 def worst(cards: list[Card], count: int) -> str:
@@ -257,11 +257,11 @@ def worst(cards: list[Card], count: int) -> str:
         )
         for c in sorted(cards, key=lambda c: -c.severity)[:count]
     ]
-    return table(("material", "fit", "largest albedo, at degrees", "gained on average", "negative at worst"), rows)
+    return table(("material", "fit", "largest albedo, at view angle", "average energy gain", "negative light"), rows)
 
 
 class Material(NamedTuple):
-    """All fits of a material: cube roots and pictures by fit, those of the network under "network"."""
+    """All fits of a material: cube roots and pictures, keyed by fit; the key of the network is "network"."""
 
     name: str
     values: dict[str, Array]
@@ -272,7 +272,7 @@ class Material(NamedTuple):
 
     @property
     def spread(self) -> float:
-        """Median distance between two of its fits."""
+        """Median distance between two fits of the material."""
         fits = [fit for fit in self.values if fit != "network"]
         return float(np.median([self.distance(a, b) for i, a in enumerate(fits) for b in fits[:i]]))
 
@@ -312,7 +312,7 @@ def figure_energy(cards: list[Card]) -> None:
 
 
 def smooth_sphere(brdf: BRDF) -> Array:
-    """The sphere as sRGB values on white, (BALL, BALL, 3), each pixel the mean of some samples."""
+    """sRGB values of a sphere on white, with shape (BALL, BALL, 3); each pixel is the mean of several samples."""
     inside, eye, to_lights = sphere(BALL * OVERSAMPLING)
     fine = np.ones((*inside.shape, 3))
     fine[inside] = np.clip(radiance(brdf, eye, to_lights), 0.0, 1.0)
@@ -320,7 +320,7 @@ def smooth_sphere(brdf: BRDF) -> Array:
 
 
 def figure_spheres(path: Path, names: list[str], weights: dict[str, Array]) -> None:
-    """Draw a sheet with one column per material, the network's row above those of the fits."""
+    """Draw a sheet with one column per material; the row of the network is above those of the fits."""
     fits = ["network", *library.published()]
     dpi, width, label, head = 100, 1280, 320, 112  # pixels
     height = head + len(fits) * BALL + 4
@@ -362,7 +362,7 @@ def scales() -> str:
 
 
 def rescaled(materials: list[Material]) -> tuple[float, float]:
-    """Median distance of Ngan's fits from other fits of the same material: as printed, and with MERL's factors."""
+    """Median distance between Ngan's and other fits of the same material, without and with MERL's scale factors."""
     factor = np.cbrt(np.array([1.0, 1.15, 1.66]))
     plain, mended = [], []
     for m in materials:
@@ -375,7 +375,7 @@ def rescaled(materials: list[Material]) -> tuple[float, float]:
 
 
 def strangers(materials: list[Material]) -> float:
-    """Median distance between two different materials, both in Bagher's fit."""
+    """Median distance between Bagher's fits of two different materials."""
     values = [m.values[library.DEFAULT] for m in materials]
     return float(np.median([apart(a, b) for i, a in enumerate(values) for b in values[:i]]))
 
@@ -411,8 +411,8 @@ def networks(materials: list[Material]) -> str:
                 f"{image:.3f} / {rms(m.pictures[library.DEFAULT], m.pictures['network']):.3f}",
             )
         )
-    header = "material", "nearest fit", "its distance", "Bagher's", "median of all", "sphere, RMS: nearest / Bagher's"
-    return table(header, rows)
+    header = "material", "nearest fit", "distance of the nearest fit", "of Bagher's fit", "median of all fits"
+    return table((*header, "RMS difference, nearest / Bagher's"), rows)
 
 
 def spreads(materials: list[Material], count: int) -> str:
@@ -423,7 +423,7 @@ def spreads(materials: list[Material], count: int) -> str:
         a, b = max(pairs, key=lambda pair: pairs[pair])
         image = float(np.median([rms(m.pictures[x], m.pictures[y]) for x, y in pairs]))
         rows.append((m.name, f"{m.spread:.2f}", f"{image:.3f}", f"{pairs[a, b]:.2f}: `{a}`, `{b}`"))
-    return table(("material", "median distance of two fits", "sphere, median RMS", "farthest apart"), rows)
+    return table(("material", "median distance", "median RMS difference", "largest distance"), rows)
 
 
 def main() -> None:

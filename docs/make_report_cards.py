@@ -1,9 +1,9 @@
-"""Write docs/report-cards/: the verdicts on every Gonio model and every BSDF plugin of Mitsuba.
+"""Write docs/report-cards/: the verdicts on all Gonio models and all BSDF plugins of Mitsuba.
 
     python docs/make_report_cards.py [--effort quick|default] [--only NAME,...] [--seed 1]
 
-One page per material, README.md with all failures in order of severity, cards.json with all measured values, and in
-programs/, for each failure of a Mitsuba plugin, a program that needs only Mitsuba.
+The folder contains one page per material, README.md with all failures in order of severity, cards.json with all
+measured values and, in programs/, a program for each failure of a Mitsuba plugin. The programs need only Mitsuba.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ MARKS = {PASS: "pass", FAIL: "**fails**", DECLARED: "declared", NOT_APPLICABLE: 
 FURNACE = re.compile(r"(loss|gain) in a white furnace: (.*)")
 SHORT = [name for name, law in laws().items() if not law.on_request]
 
-# settings that the verifier would not try by itself, in addition to the defaults
+# settings to test in addition to the defaults
 SETTINGS = {
     "mitsuba:roughconductor": [["distribution=ggx"]],
     "mitsuba:roughdielectric": [["distribution=ggx"]],
     "mitsuba:roughplastic": [["distribution=ggx"]],
 }
 
-# worst first: grades that bias pictures, then those that bias none, then those of other materials
+# worst first: grades that bias pictures, then those that do not, then failures for which the material is not at fault
 ORDER = [
     *(Grade.BROKEN, Grade.VISIBLE, Grade.SMALL, Grade.INVISIBLE, Grade.NAN),
     *(Grade.NOISE, Grade.FITTING, Grade.INTERFACE, Grade.INNER, Grade.BY_NATURE),
@@ -51,41 +51,42 @@ ORDER = [
 UPSTREAM = {
     ("principled", "calls"): "mitsuba3 #1951 (merged 2026-09-07, not yet released) names the components",
     ("principledthin", "calls"): "mitsuba3 #1951 (merged 2026-09-07, not yet released) names the components",
-    ("principled", "energy"): "mitsuba3 #465 (closed) is about the energy that its transmission loses",
+    ("principled", "energy"): "mitsuba3 #465 (closed) concerns energy that is lost in transmission",
     ("blendbsdf", "calls"): "mitsuba2 #151 (open): the component is always 0",
-    ("blendbsdf", "positivity"): "mitsuba3 #1681 (merged 2025) fixed its pdf and null lobes",
+    ("blendbsdf", "positivity"): "mitsuba3 #1681 (merged 2025) fixed the pdf and the null lobes",
     ("roughplastic", "positivity"): "mitsuba2 #32 (open): NaN where the cosine is 0",
-    ("roughplastic", "energy"): "mitsuba3 #1155 (closed) is about the energy that it loses when rough",
+    ("roughplastic", "energy"): "mitsuba3 #1155 (closed) concerns energy that is lost at high roughness",
     ("hair", "pdf"): "mitsuba3 #871 (merged 2023): Mitsuba's own chi-square test of hair covers few parameters",
 }
 
 EXPLANATION = """
-- *pass*: the law holds within its tolerance, at the given parameter values and at the others listed on the material's
-  card. *declared*: the model declares that it violates the law, and by how much. *-*: the law does not apply; the card
-  gives the reason.
-- A failure is shown by its grade. Four grades state the error of the reflected light: *invisible* (less than 0.1 % on
-  average and 1 % at worst), *small* (1 %, 10 %), *visible* (10 %, 50 %) and *broken* (more). The others state its kind:
-  *NaN* (values that are not finite), *noise* (samples are wasted, without bias), *interface* (the failure occurs only
-  in calls that a plain path tracer does not make), *inner* (the failure is that of a nested material; with a correct
-  one, the law holds) and *by nature* (no BSDF of this kind can obey the law).
-- Mitsuba's plugins are evaluated in float32, and tested with wider tolerances. `gradients` and `precision` need a
-  64-bit reference, so they are not tested.
-- A sample of weight 0 counts as failed, as in Mitsuba's own chi-square test.
+- *pass*: the law holds within its tolerance, at the given parameter values and at the other values listed on the
+  material's card. *declared*: the model declares that it violates the law, and declares the size of the violation.
+  *-*: the law does not apply; the card gives the reason.
+- A failure is listed with its grade. Four grades measure the error of the reflected light: *invisible* (less than 0.1 %
+  on average and less than 1 % at worst), *small* (less than 1 % and 10 %), *visible* (less than 10 % and 50 %) and
+  *broken* (larger errors). The other grades state the kind of failure: *NaN* (some values are not finite), *noise*
+  (samples are wasted, but nothing is biased), *interface* (the failure occurs only in calls that a plain path tracer
+  does not make), *inner* (a nested material fails; with a correct one, the law holds) and *by nature* (no BSDF of this
+  kind can obey the law).
+- Mitsuba's plugins are evaluated in float32 and tested with wider tolerances. The laws `gradients` and `precision` need
+  double precision and are therefore not tested for these plugins.
+- For Mitsuba's plugins, a sample of weight 0 counts as failed, as in Mitsuba's own chi-square test.
 - Composite BSDFs are tested with simple nested materials: `blendbsdf` blends `diffuse` and `roughconductor`; `mask`,
   `bumpmap` and `normalmap` contain `diffuse`; `twosided` contains `roughconductor`. `bumpmap` is tested on a uniform
   slope: a BSDF with a tilted shading normal is neither isotropic nor reciprocal with respect to the geometric normal.
   `hair` is defined relative to a fiber, not to a surface normal.
 - Directions are given as theta, phi in degrees.
-- Mitsuba's microfacet plugins use Beckmann's distribution by default; GGX is tested too.
+- Mitsuba's microfacet plugins use Beckmann's distribution by default; GGX is also tested.
 """
 
 BLIND = """
 ## What this report does not cover
 
-The tests cover one point of an untextured surface (uv = 0.5, 0.5), unpolarized light in three channels, and only the
-parameter values listed. Violations below the tolerances are not detected. The tests cover neither integrators, nor
-interreflection between surfaces, nor whether the formula is correct for the material: many wrong formulas obey the
-laws.
+The tests use one point of an untextured surface (uv = 0.5, 0.5), unpolarized light in three color channels, and only
+the parameter values listed. Violations below the tolerances are not detected. Integrators and interreflection between
+surfaces are not tested. Whether a formula is the right one for the material is not tested either: many wrong formulas
+obey the laws.
 """
 
 
@@ -100,14 +101,14 @@ def trials(target: str) -> list[Any]:
 
 
 def losses(report: Report) -> dict[str, str]:
-    """The loss or gain of the white furnace, per setting."""
+    """The loss or gain in the white furnace, per setting."""
     notes_of = {card.title: [FURNACE.match(note) for note in card["energy"].notes] for card in report.cards}
     first = {title: next(filter(None, matches), None) for title, matches in notes_of.items()}
     return {title: f"{match[1]} of {match[2]}" for title, match in first.items() if match}
 
 
 def summary(report: Report, law: str) -> str:
-    """One cell: the worst verdict of a law over all settings."""
+    """A table cell: the worst verdict on a law over all settings."""
     verdicts = [card[law] for card in report.cards]
     failed = sorted((v for v in verdicts if v.failed), key=_rank)
     if failed:
@@ -129,14 +130,14 @@ def shows(program: str) -> bool:
 
 
 def findings(target: str, report: Report) -> list[dict[str, Any]]:
-    """All failures, and the programs that show them."""
+    """All failures. Writes a program for each failure that can be reproduced without Gonio."""
     failures = []
     for card in report.cards:
         for v in card.verdicts:
             if not v.failed:
                 continue
             if v.reproduction and not shows(v.reproduction):
-                v.reproduction = ""  # it draws too few of the random numbers at which the law fails
+                v.reproduction = ""  # it draws too few of the random numbers for which the law fails
             name = "-".join([target.removeprefix("mitsuba:"), *map(str, card.subject.settings.values()), v.law])
             if v.reproduction:
                 PROGRAMS.mkdir(exist_ok=True)
@@ -170,15 +171,15 @@ def _size(v: Verdict) -> str:
 
 
 def page(target: str, report: Report) -> str:
-    """The page of one target."""
+    """The page for one target."""
     made = f"Mitsuba {version('mitsuba')}, " if ":" in target else ""
     lines = [
         f"# {target}",
         "",
-        f"These are the results of `gonio verify` ({made}Gonio {go.__version__}, {datetime.date.today()}, "
-        f"{report.effort} effort, seed {report.seed}), with {report.tests} statistical tests, each at a significance "
-        f"level of {report.threshold:.1e} (0.01 overall, Sidak correction). A rejection counts only if a second seed "
-        "confirms it.",
+        f"This page lists the results of `gonio verify` ({made}Gonio {go.__version__}, {datetime.date.today()}, "
+        f"{report.effort} effort, seed {report.seed}). The report includes {report.tests} statistical tests, each at a "
+        f"significance level of {report.threshold:.1e} (0.01 overall, Sidak correction). A rejection counts only if a "
+        "test with a second seed confirms it. Directions are given as theta, phi in degrees.",
     ]
     for card in report.cards:
         lines += [
@@ -192,14 +193,14 @@ def page(target: str, report: Report) -> str:
             allowed = "" if v.tolerance is None or v.tolerance == float("inf") else f"{v.tolerance:.0e}"
             grade = f": {v.grade}" if v.failed and v.grade else ""
             lines.append(f"| {v.law} | {MARKS[v.status]}{grade} | {v.shown} | {allowed} | {_remark(v)} |")
-        lines += ["", card.covered[:1].upper() + card.covered[1:] + "."]
+        lines += ["", f"The material was {card.covered}."]
         if card.quality is not None:
             lines += ["", card.quality.words.capitalize() + "."]
         for v in sorted((v for v in card.verdicts if v.failed), key=_rank):
             lines += ["", f"**{v.law}**: {'; '.join(_clean(w) for w in v.why)}."]
             if v.bias is not None:
                 lines += [f"Effect on a picture: {_clean(v.bias.words)}."]
-            lines += [f"Cause: {_clean(v.cause) or 'unknown'}.", "", f"    {v.command}"]
+            lines += [f"Cause: {_ended(_clean(v.cause) or 'unknown')}", "", f"    {v.command}"]
             if v.reproduction:
                 lines += ["", "```python", v.reproduction.rstrip(), "```"]
     return "\n".join(lines) + "\n" + BLIND
@@ -212,8 +213,13 @@ def _remark(v: Verdict) -> str:
 
 
 def _number(text: str) -> str:
-    """The number in a description of a sampling quality: "0.35 %", "2.9"; "" if there is none."""
+    """The number in the description of a measure of sampling quality: "0.35 %", "2.9"; "" if there is none."""
     return "".join(re.findall(r"[0-9.]+(?: %)?", text)[:1])
+
+
+def _ended(text: str) -> str:
+    """The text with a period, unless it is a question."""
+    return text if text.endswith("?") else f"{text}."
 
 
 def _clean(text: str) -> str:
@@ -221,7 +227,7 @@ def _clean(text: str) -> str:
 
 
 def _untested(target: str, reason: str) -> str:
-    """The text of a page for a target that cannot be created."""
+    """The text of the page for a target that cannot be created."""
     *_, message = reason.rpartition("Mitsuba rejects it: ")
     why = f"`{target}` was not tested, because it cannot be created without parameters."
     return f"{why} The error message is: {message}"
@@ -275,18 +281,18 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
     lines = [
         "# Report cards",
         "",
-        f"These are the results of `gonio verify` for {renderers}, {effort} effort, seed {seed}.",
-        "The page is generated by `python docs/make_report_cards.py`. A cell gives the worst verdict over all settings",
-        "of a target. The shaders of engines have [their own cards](engines/README.md).",
+        f"This page summarizes the results of `gonio verify` for {renderers}, {effort} effort, seed {seed}.",
+        "It is generated by `python docs/make_report_cards.py`. The tables give the worst verdict on each law over all",
+        "settings of a target. The shaders of engines have [their own report cards](engines/README.md).",
         "",
         *EXPLANATION.strip().splitlines(),
         "",
         "## Failures, worst first",
         "",
-        "Percentages refer to the reflected light. Each program needs only Mitsuba; while the fault exists, it ends",
-        "with an AssertionError that states the measured value.",
+        "Percentages refer to the reflected light. The programs need only Mitsuba; as long as a defect exists, its",
+        "program ends with an AssertionError that states the measured value.",
         "",
-        "| grade | BSDF | law | effect | probable cause | known upstream | program |",
+        "| grade | BSDF | law | effect | probable cause | upstream issue | program |",
         "|---|---|---|---|---|---|---|",
     ]
     failures = [one for _, result in ordered for one in result.get("findings", [])]
@@ -312,11 +318,12 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
         "",
         "## Sampling quality",
         "",
-        "These values are not verdicts: materials that obey all laws may differ here. All are means over the",
-        "hemisphere of wo. The last two columns give the efficiency relative to cosine sampling and to sampling",
-        "without variance.",
+        "These values are measurements, not verdicts; they differ even between materials that obey all laws. Each",
+        "value is a mean over directions wo. The last two columns give the efficiency relative to cosine sampling and",
+        "to ideal sampling, which has no variance.",
         "",
-        "| target, setting | failed samples | variance of the weight | relative to cosine sampling | of the ideal |",
+        "| target and setting | failed samples | relative variance of the weights | relative to cosine sampling "
+        "| relative to ideal sampling |",
         "|---|---|---|---|---|",
     ]
     for _, result in ordered:
@@ -327,10 +334,10 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
         "",
         "## White furnace",
         "",
-        "Every albedo is 1 and, if it can be chosen, F = 1. The table gives the average over a hemisphere and the",
-        "extreme.",
+        "For this test, every albedo and, if possible, F is set to 1, so that nothing is absorbed. The table gives the",
+        "loss or gain of energy: its cosine-weighted average over the hemisphere of wo, and its extreme value.",
         "",
-        "| target, setting | loss or gain |",
+        "| target and setting | loss or gain |",
         "|---|---|",
     ]
     for _, result in ordered:

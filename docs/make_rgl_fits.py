@@ -2,8 +2,8 @@
 
     python docs/make_rgl_fits.py FOLDER [-o docs]
 
-FOLDER holds the .bsdf files, which are not part of the repository. Errors are those of benchmarks/rgl_fits.py; those in
-rgl-fits/fits.json are not computed again.
+FOLDER contains the .bsdf files, which are not part of the repository. benchmarks/rgl_fits.py computes the errors; those
+that are already stored in rgl-fits/fits.json are not recomputed.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ import rgl_fits as errors  # noqa: E402
 SHOWN = (
     "lambert", "conductor", "cook-torrance", "disney", "lambert+ggx", "lambert+ggx+ggx",
 )  # fmt: skip
-VALUES = 6000  # values of each file, for the errors of all models
-BRIGHT = 0.9  # linear value that the brightest pixels of a measured ball get, except the highlight's
+VALUES = 6000  # number of values of each file to which all models are fitted
+BRIGHT = 0.9  # linear value of the brightest pixels of a measured ball, excluding the highlight
 MARGIN, HEAD, LABEL = 6, 30, 84  # pixels
 
 
 class File(NamedTuple):
-    """A measured file, all its values, and the fits to a sample of them."""
+    """A measured file, all of its values, and the fits to a sample of them."""
 
     name: str
     measured: go.BSDF
@@ -52,7 +52,7 @@ class File(NamedTuple):
 
 
 def ball(brdf: BRDF, size: int) -> Array:
-    """Linear radiance of a sphere under three lights, (size, size, samples, 3); nan around it."""
+    """Linear radiance of a sphere under three lights, with shape (size, size, samples, 3); nan outside the sphere."""
     inside, eye, to_lights = sphere(size * OVERSAMPLING)
     fine = np.full((*inside.shape, 3), np.nan)
     fine[inside] = radiance(brdf, eye, to_lights)
@@ -61,19 +61,19 @@ def ball(brdf: BRDF, size: int) -> Array:
 
 
 def shown(samples: Array, gain: float) -> Array:
-    """sRGB values of a ball on white."""
+    """sRGB values of a ball on a white background."""
     return encoded(np.nan_to_num(np.clip(gain * samples, 0.0, 1.0), nan=1.0).mean(2))
 
 
 def difference(fitted: Array, measured: Array, gain: float) -> Array:
-    """Difference of sRGB values, added to gray: brighter where the fit is brighter; white around the ball."""
+    """Half the difference of sRGB values, added to gray: bright where the fit is brighter; white around the ball."""
     around = np.isnan(measured[..., 0]).mean(2)[..., None]
     gray = 0.5 + 0.5 * (shown(fitted, gain) - shown(measured, gain))
     return np.asarray((1.0 - around) * gray + around)
 
 
 def draw(file: File, path: Path, size: int = BALL) -> None:
-    """A sheet: the measured ball, then a column per model, with the fit above its difference from the measured one."""
+    """Draw a sheet: the measured ball, then one column per model, with the fit above its difference from the data."""
     truth = ball(of(file.measured), size)
     gain = BRIGHT / max(float(np.nanpercentile(truth, 95.0)), 1e-6)
     width = 2 * MARGIN + (1 + len(file.fits)) * size
@@ -105,18 +105,19 @@ def draw(file: File, path: Path, size: int = BALL) -> None:
 
 
 def of_data(files: Sequence[File]) -> str:
-    """The number of values in each file, and of those that have no weight or are left out."""
+    """Table of the number of values in each file, and of negative and excluded ones."""
     rows = []
     for file in files:
         data = file.data
         share = " / ".join(f"{100.0 * n / len(data):.2g}" for n in data.negative)
         left = ", ".join(f"{count:,} {why}" for why, count in data.out.items()) or "0"
         rows.append((file.title, f"{3 * len(data):,}", f"{int(data.negative.sum()):,}", share, left))
-    return table(("file", "values", "negative", "% of red / green / blue", "directions left out"), rows)
+    header = "file", "values", "negative values", "negative, % of red / green / blue", "excluded directions"
+    return table(header, rows)
 
 
 def of_errors(rows: Sequence[dict[str, Any]], names: Sequence[str]) -> str:
-    """Errors of all models, one row per model, the best of each file in bold."""
+    """Table of the errors, one row per model, with the smallest error for each file in bold."""
     found = {(row["model"], row["file"]): row["error"] for row in rows}
     medians = {m: float(np.median([found[m, name] for name in names])) for m in {row["model"] for row in rows}}
     models = sorted(medians, key=lambda m: (medians[m], m))
@@ -131,28 +132,28 @@ def of_errors(rows: Sequence[dict[str, Any]], names: Sequence[str]) -> str:
 
 
 def of_starts(rows: Sequence[dict[str, Any]]) -> str:
-    """The largest excess error of fits relative to the best of the random starts, per model."""
+    """Table of the largest and smallest excess error per model, relative to the best random start."""
     models = list(dict.fromkeys(row["model"] for row in rows if row["excess"] is not None))
     lines = []
     for model in models:
         mine = [row for row in rows if row["model"] == model]
         worst, best = max(mine, key=lambda row: row["excess"]), min(mine, key=lambda row: row["excess"])
         lines.append((f"`{model}`", len(mine), *(f"{100.0 * row['excess']:+.2f} %" for row in (worst, best))))
-    return table(("model", "files", "most", "least"), lines)
+    return table(("model", "files", "largest excess", "smallest excess"), lines)
 
 
 # --------------------------------------------------------------------------- the page
 
 
 def fitted(path: Path, models: Sequence[str], values: int = VALUES) -> File:
-    """The fits of the given models to a sample of `values` values."""
+    """The fits of the given models to a sample of `values` values of a file."""
     cells = data_of(read(path), where=str(path))
     fits = {model: go.fit(cells.some(values), model) for model in models}
     return File(path.stem, go.Measured(str(path)), cells, fits)
 
 
 def page(files: Sequence[File], rows: Sequence[dict[str, Any]], template: str) -> str:
-    """The page's text."""
+    """The text of the page."""
     judged = [row["excess"] for row in rows if row["excess"] is not None]
     sheets = [f"![{f.title}: measured, fits and differences](rgl-fits/{f.name}.webp)" for f in files]
     parts = {

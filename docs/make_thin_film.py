@@ -1,4 +1,4 @@
-"""Write docs/thin-film.md and its picture: how far the colors of the two thin films are from an exact multilayer.
+"""Write docs/thin-film.md and its picture: color errors of both thin-film models, relative to exact multilayers.
 
 python docs/make_thin_film.py          takes a minute; needs `tmm` (in the extra `dev`)
 """
@@ -26,7 +26,7 @@ import sheets  # noqa: E402
 Floats = NDArray[np.float64]
 
 NM = np.arange(380.0, 781.0, 5.0)
-SYMBOLS = ("Ag", "Al", "Au", "Cr", "Cu", "Hg", "Ni", "W")  # metals whose full spectrum Mitsuba ships
+SYMBOLS = ("Ag", "Al", "Au", "Cr", "Cu", "Hg", "Ni", "W")  # metals for which Mitsuba ships spectral data
 FORMS = {"belcour-barla": "Belcour-Barla", "local": "local"}
 THICKNESSES = np.array([50, 100, 150, 200, 250, 300, 350, 400, 500, 600, 700, 800, 1000, 1200, 1400, 1600, 2000], float)
 ANGLES = np.array([0.0, 30.0, 45.0, 60.0, 75.0, 85.0])
@@ -36,7 +36,7 @@ WHITE = np.linalg.inv(colour.XYZ_TO_RGB) @ np.ones(3)
 
 
 def index_of(symbol: str) -> NDArray[np.complex128]:
-    """The measured index of a metal at `NM`."""
+    """Measured index of refraction of a metal at the wavelengths `NM`."""
     folder = Path(str(mitsuba.__file__)).parent / "data" / "ior"
     parts = []
     for name in ("eta", "k"):
@@ -58,7 +58,7 @@ def exact(n: NDArray[np.complex128], film: float, thickness: float, degrees: flo
 
 
 def modelled(form: str, n: NDArray[np.complex128], film: float) -> Floats:
-    """XYZ by an RGB material, (thickness, angle, 3), with the metal's index at 650, 550 and 450 nm."""
+    """XYZ of an RGB material, (thickness, angle, 3), with the metal's index at 650, 550 and 450 nm."""
     three = np.interp(RGB_WAVELENGTHS, NM, n)
     rows, columns = np.meshgrid(THICKNESSES, np.radians(ANGLES), indexing="ij")
     wo = np.stack([np.sin(columns), 0.0 * columns, np.cos(columns)], -1).reshape(-1, 3)
@@ -114,7 +114,7 @@ def check() -> None:
 
 
 def table(head: str, rows: list[tuple[str, Callable[[Floats], Floats]]], found: dict[str, Floats]) -> str:
-    """Mean and maximum of each form, one row per selection."""
+    """Mean and maximum error of each form, one row per selection."""
     lines = [f"| {head} | " + " | ".join(f"{name}, mean | {name}, worst" for name in FORMS.values()) + " |"]
     lines.append("|---|" + "---|" * (2 * len(FORMS)))
     for label, pick in rows:
@@ -124,7 +124,7 @@ def table(head: str, rows: list[tuple[str, Callable[[Floats], Floats]]], found: 
 
 
 def picture(truth: Floats, models: dict[str, Floats]) -> None:
-    """Color strips over film thickness, for three metals at normal incidence."""
+    """Color strips as a function of film thickness, for three metals at normal incidence."""
     shown = ("Au", "Cr", "Cu")
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     axes = figure.subplots(len(shown), 1)
@@ -140,7 +140,7 @@ def picture(truth: Floats, models: dict[str, Floats]) -> None:
 
 
 def balls(size: int = 300, spp: int = 64) -> None:
-    """Balls of oxidized titanium and soap bubbles of increasing film thickness, in the dark studio of all models."""
+    """Balls of oxidized titanium and soap bubbles with films of increasing thickness, in the scene of all models."""
     cells = []
     for nm in (0, 25, 50, 100, 160, 220, 300, 450):
         cells.append((nm, go.FilmConductor.preset("Ti", alpha=0.12, film_eta=2.3, thickness=float(nm))))
@@ -148,7 +148,7 @@ def balls(size: int = 300, spp: int = 64) -> None:
         cells.append((nm, go.FilmDielectric(1.0, 0.0, film_eta=1.33, thickness=float(nm))))
 
     def ball(material: go.BSDF) -> Floats:
-        # light passes through a bubble, so its paths have several segments
+        # light passes through a bubble, which needs paths of several segments
         values = {"shapes.0.material": material}
         return go.render(
             EXAMPLES / "all-models", overrides=values, size=(size, size), spp=spp, integrator="path", max_depth=8,
@@ -168,8 +168,8 @@ def encoded(linear: Floats) -> Floats:
 
 PAGE = """# Thin films
 
-`film-conductor` and `film-dielectric` have a clear film on every facet. `thickness` is the thickness of the film in nm,
-and `film_eta` is its index.
+`film-conductor` and `film-dielectric` are microfacet models in which a clear film coats every facet. `thickness` is the
+thickness of the film in nm, and `film_eta` is its index of refraction.
 
     gonio render "film-conductor(preset=Cr,alpha=.15,thickness=400)" -o heat.png
     gonio plot "film-dielectric(eta=1,film_eta=1.33,thickness=350,alpha=0)" --kind albedo     # a soap bubble
@@ -178,27 +178,27 @@ and `film_eta` is its index.
 
 At a single wavelength, the sum of all waves that the two interfaces of the film reflect is
 r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)). Here r12 and r23 are the amplitude reflection coefficients of
-the outer and the inner interface, and delta is the phase that a wave gains on its way through the film and back. The
-sum agrees with the characteristic matrix of a layer to 1e-12 (`tests/optics/test_film.py`). Spectral variants evaluate
-this amplitude per wavelength. In RGB, the parameter `form` selects how the three color channels are derived from it:
+the outer and the inner interface, and delta is the phase shift of a wave that passes through the film and back. The
+sum agrees with the characteristic-matrix method to 1e-12 (`tests/optics/test_film.py`). Spectral variants evaluate
+this amplitude at each wavelength. In RGB, the parameter `form` selects how the color channels are computed:
 
 - `local` (default) is the locally spectral form that the authors of OpenPBR proposed (issue 246, pull request 262 of
   its repository). The reflectance at 20 wavelengths is converted to a color under D65 for the CIE 1931 observer. The
   metal's index is interpolated linearly between its values at 650, 550 and 450 nm.
-- `belcour-barla` (Belcour2017) approximates the color matching functions of the observer by Gaussians in wave number,
-  which turn interference into a damped oscillation. It is faster, and thick films correctly fade to gray. The mean of
-  the reflectance over wavelengths is computed per RGB channel.
+- `belcour-barla` (Belcour2017) approximates the color matching functions by Gaussians in wavenumber. The interference
+  term then becomes a damped oscillation. This form is faster, and the colors of thick films correctly
+  fade to gray. The mean reflectance over wavelengths is computed for each RGB channel.
 
-At thickness 0, `local` gives the color of the bare metal over the whole spectrum, which is more saturated than the
+At thickness 0, `local` gives the color of the bare metal computed from the spectrum, which is more saturated than the
 three-channel color of a `conductor`. `belcour-barla` reproduces the color of the `conductor` to within 2 %.
 
 ## Accuracy
 
-The reference is the exact reflectance of the film on the metal, computed by the package `tmm` with transfer matrices at
-81 wavelengths, with the metal's measured index, under D65. The films are 50 to 2,000 nm thick and have indices of 1.38
-and 2.0. Both forms use the metal's index at three wavelengths only. The tables give color differences from the
-reference in CIE Delta E 2000 (Sharma2005): a difference of 1 is just noticeable side by side, one of 5 is a different
-shade, and one of 10 is a different color.
+The reference color is computed under D65 from the exact reflectance of the film on the metal, which the package `tmm`
+computes by the transfer-matrix method from the metal's measured index at 81 wavelengths. The films are 50 to 2,000 nm
+thick and have indices of 1.38 and 2.0. Both forms use the metal's index at three wavelengths only. The tables give the
+mean and the largest color difference from the reference in CIE Delta E 2000 (Sharma2005): a difference of 1 is just
+noticeable side by side, a difference of 5 is a different shade, and a difference of 10 is a different color.
 
 {metals}
 
@@ -247,14 +247,14 @@ def main() -> None:
 
 
 def words(found: dict[str, Floats]) -> str:
-    """The text that states the results of the tables."""
+    """Summary of the results in the tables."""
     share = {form: np.mean(e < 2.0) for form, e in found.items()}
     thin = THICKNESSES <= 800
     near = {form: e[:, :, thin].mean() for form, e in found.items()}
     far = {form: e[:, :, ~thin].mean() for form, e in found.items()}
     return (
-        f"The error is below 2 in {100 * share['local']:.0f} % of the cases with `local`, and in "
-        f"{100 * share['belcour-barla']:.0f} % with `belcour-barla`.\nFor films of up to 800 nm, the mean error is "
+        f"The color difference is below 2 in {100 * share['local']:.0f} % of the cases with `local` and in "
+        f"{100 * share['belcour-barla']:.0f} % with `belcour-barla`.\nFor films of up to 800 nm, its mean is "
         f"{near['local']:.1f} with `local` and {near['belcour-barla']:.1f} with `belcour-barla`; for thicker films,\n"
         f"it is {far['local']:.1f} and {far['belcour-barla']:.1f}, respectively."
     )

@@ -610,6 +610,6 @@ def test_emit_names_the_tables_that_only_a_folder_receives(
     names = "table_missing_ggx_smith_correlated"
     said = f"the shader reads a table that is not in its text: {names}; -o DIR/ writes them too\n"
     assert capsys.readouterr().err == said
-    assert "missing_ggx_smith_correlated.f32, which an output folder (-o DIR/) holds" in Path("a.glsl").read_text()
+    assert "missing_ggx_smith_correlated.f32, which an output folder (-o DIR/) contains" in Path("a.glsl").read_text()
     assert gonio("emit", material, "--functions", "eval", "-o", "a/") == 0
     assert not capsys.readouterr().err and Path("a/missing_ggx_smith_correlated.f32").is_file()

@@ -1,1 +1,1 @@
-"""What makes the book of docs/: its pages from the code, and an extension of Sphinx."""
+"""The Sphinx extension that builds the book in docs/ and generates some of its pages from the code."""

@@ -13,19 +13,17 @@ from .text import escaped, fenced, markdown, table
 
 HEAD = """# Python API
 
-All names of `import gonio as go`.
-Arrays are NumPy's or Dr.Jit's; `(N, 3)` is N directions or spectra. A list of
-length 3 is broadcast.
-Directions are unit vectors of the local frame, +z the normal. Values are linear; angles are in radians and
-wavelengths in nanometers ([Conventions](../../conventions.md)).
-Every model is a class too: see [Models](../models/index.md).
+These pages describe all public names of `import gonio as go`. Arrays are NumPy or Dr.Jit arrays; an array of shape
+`(N, 3)` contains N directions or spectra. A list of length 3 is broadcast. Directions are unit vectors in the local
+frame, whose +z axis is the normal. Color values are linear, angles are in radians, and wavelengths are in nanometers
+([Conventions](../../conventions.md)). Each model is also a class; see [Models](../models/index.md).
 """
 TOPICS = {
     "Materials": "material materials fits models model mix two_sided BSDF Sample Preset KnownViolation Limit Parameter",
-    "Declare your own": "number spectrum width angle index choice flag file bsdf method never register "
+    "Define your own components": "number spectrum width angle index choice flag file bsdf method never register "
     "Angle Colour Index Number Width Direction Mask Mode Pair Scalar Spectrum NDF Stretched Masking Fresnel Interface "
     "Integrator Law Panel ops",
-    "Render and look": "render resume study report plot view compare explain info convert",
+    "Rendering and plots": "render resume study report plot view compare explain info convert",
     "Energy and light": "albedo Albedo bake compensation fresnel indices refractive_index",
     "Measure and fit": "measure capture fit fit_picture compress check",
     "Shaders and laws": "emit Shader verify",
@@ -80,7 +78,7 @@ def _members(name: str, cls: type) -> list[str]:
             text = escaped(" ".join((inspect.getdoc(plain) or "").split("\n\n")[0].split()))
             shown = key if isinstance(plain, property) else _signature(key, plain)
             rows.append((f"`{' '.join(shown.split())}`".replace("|", "\\|"), text))
-    return [table(("member", ""), rows)] if rows else []
+    return [table(("member", "description"), rows)] if rows else []
 
 
 def _signature(name: str, thing: Any) -> str:

@@ -1,4 +1,4 @@
-"""The bibliography, with a link to every page of the book and every file that cites an entry."""
+"""The bibliography, with links to the pages of the book and the names of the files that cite each entry."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LETTER = re.compile(r"\\(AA|aa|ae|ss|O|o|L|l)(?![A-Za-z])\s*")
 
 @cache
 def known() -> dict[str, dict[str, str]]:
-    """key -> field -> text of docs/references.bib."""
+    """The entries of docs/references.bib: key -> field -> text."""
     text = (ROOT / "docs/references.bib").read_text(encoding="utf-8")
     return {
         entry[2]: {field[1]: plain(field[2] or field[3]) for field in FIELD.finditer(entry[3])}
@@ -32,7 +32,7 @@ def known() -> dict[str, dict[str, str]]:
 
 
 def plain(text: str) -> str:
-    """BibTeX's text in Unicode."""
+    """BibTeX text converted to Unicode."""
 
     def accented(found: re.Match[str]) -> str:
         mark, letter = (found[1], found[2]) if found[1] else (found[3], found[4])
@@ -44,7 +44,7 @@ def plain(text: str) -> str:
 
 
 def citation(key: str) -> str:
-    """An entry in one line of Markdown."""
+    """An entry as one line of Markdown."""
     entry = known()[key]
     authors = entry.get("author", "").split(" and ")
     names = ", ".join(authors[:3]) + (" and others" if len(authors) > 3 else "")
@@ -54,8 +54,8 @@ def citation(key: str) -> str:
 
 
 def pages() -> dict[str, str | bytes]:
-    """The page of the bibliography."""
-    lines = ["# Bibliography", "", "Each entry with the pages and source files that cite it.", ""]
+    """The bibliography page."""
+    lines = ["# Bibliography", "", "Each entry is followed by the pages and source files that cite it.", ""]
     for key in sorted(known()):
         lines += [f"({key.lower()})=", f"- {citation(key)}. Cited by {_uses(key)}.", ""]
     return {"reference/bibliography/index.md": "\n".join(lines)}

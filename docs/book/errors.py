@@ -1,4 +1,4 @@
-"""Every error that Gonio raises, with its remedy, read from the source."""
+"""A page that lists all errors that Gonio raises, with their remedies, read from the source code."""
 
 from __future__ import annotations
 
@@ -15,29 +15,30 @@ KINDS = ("InputError", "MachineError", "GonioWarning")
 
 HEAD = """# Troubleshooting
 
-A message gives its place, what was given, what is accepted, and a remedy on the line `hint:`. This table is read from
-the source: every message that has a remedy, by the package that raises it. Words in *italics* stand for what you gave.
+An error message states where the error is, what was given, what is accepted and, on a line that starts with `hint:`,
+what to do. The following tables are generated from the source code. They list all messages that have a hint, grouped by
+the part of Gonio that raises them. Words in *italics* are placeholders for values that depend on your input.
 
 | exit code | meaning |
 |---|---|
-| 0 | done |
-| 1 | a verdict of "fails": a law, a tolerance, a baseline |
+| 0 | success |
+| 1 | a failed check: a law is violated, a tolerance is exceeded, or a result differs from its baseline |
 | 2 | bad usage or input (`InputError`) |
-| 3 | a missing resource of the machine (`MachineError`): see `gonio doctor` |
-| 128 + n | ended by signal n; 130 is Ctrl-C |
+| 3 | a resource that the machine lacks (`MachineError`): see `gonio doctor` |
+| 128 + n | termination by signal n (130: Ctrl-C) |
 """
 TITLES = {
     "scene": "Scenes", "cli": "The command line", "verify": "Laws", "catalog": "Names and documents",
     "measure": "Measured files",
-    "render": "Rendering", "viewer": "The page", "shaders": "Shader code", "instruments": "Instruments",
+    "render": "Rendering", "viewer": "The viewer", "shaders": "Shader code", "instruments": "Instruments",
     "fitting": "Fitting",
-    "material": "Materials", "materials": "Materials", "optics": "Optics", "energy": "Tables", "work": "Many processes",
+    "material": "Materials", "materials": "Materials", "optics": "Optics", "energy": "Tables", "work": "Processes",
     "transport": "Integrators", "pictures": "Pictures", "bridge": "Mitsuba", "ops": "Arrays",
 }  # fmt: skip
 
 
 class Message(NamedTuple):
-    """An error as it stands in the source; text in Markdown."""
+    """An error message in the source code, as Markdown."""
 
     package: str
     what: str
@@ -45,7 +46,7 @@ class Message(NamedTuple):
 
 
 def pages() -> dict[str, str | bytes]:
-    """The page of errors."""
+    """The page that lists the errors."""
     by_title: dict[str, list[Message]] = {}
     for message in dict.fromkeys(messages()):
         by_title.setdefault(TITLES.get(message.package, "General"), []).append(message)
@@ -57,7 +58,7 @@ def pages() -> dict[str, str | bytes]:
 
 
 def messages() -> Iterator[Message]:
-    """All errors with a message and a remedy that stand in the source as text."""
+    """All errors whose message and remedy are literal strings in the source code."""
     for path in sorted(SOURCE.rglob("*.py")):
         package = path.relative_to(SOURCE).parts[0].removesuffix(".py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -75,7 +76,7 @@ def _argument(call: ast.Call, at: int, name: str) -> str:
 
 
 def _text(node: ast.expr) -> str:
-    """A text in the source as Markdown, its variable parts in italics; "" if it is computed elsewhere."""
+    """A string in the source code as Markdown, with variable parts in italics; "" if it is computed elsewhere."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return escaped(node.value)
     if isinstance(node, ast.JoinedStr):

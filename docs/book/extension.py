@@ -1,4 +1,4 @@
-"""The extension of Sphinx that makes the book: pages from the code, formulas as MathML, links out of docs/."""
+"""The Sphinx extension that builds the book: generated pages, formulas as MathML, and links to files outside docs/."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ DOCS = Path(__file__).parents[1]
 
 
 def setup(app: Any) -> dict[str, Any]:
-    """Called by Sphinx."""
+    """Register the handlers of the extension; called by Sphinx."""
     app.connect("config-inited", lambda app, config: generate.write_all(DOCS))
     app.connect("source-read", links.rewrite)
     app.connect("doctree-read", listings.color)

@@ -1,4 +1,4 @@
-"""A page for each family of parts (distributions, masking terms, Fresnel kinds, integrators, laws, ...)."""
+"""A page for each family of components (distributions, masking terms, Fresnel models, integrators, laws, ...)."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from gonio.viewer import families
 
 from .text import escaped, markdown, table
 
-INTRODUCTION = """# Parts
+INTRODUCTION = """# Components
 
-Every family of parts has a page here; each member has its description, its own functions and the way it is used.
-`gonio explain NAME` prints the same text, and your own files may add members
+There is a page for each family of components, such as masking terms or integrators. It describes each member of the
+family, its functions and its use. `gonio explain NAME` prints the same text. Your own files can add members
 ([CONTRIBUTING](../../project/contributing.md)).
 """
 
-# below the introduction of a family
+# shown below the introduction of a family
 PICTURES = {
-    "law": """![Pairs of balls, sound and with one mistake that a law finds](../../../examples/broken-laws/laws.jpg)
+    "law": """![Pairs of balls: a correct material, and one with a mistake](../../../examples/broken-laws/laws.jpg)
 
-What a violation looks like: [a ball for each broken law](../../gallery/broken-laws.md).
+For the effect of each violation on a picture, see [a ball for each broken law](../../gallery/broken-laws.md).
 """
 }
 
 
 def pages() -> dict[str, str | bytes]:
-    """A page for each family, without the materials, and their index."""
+    """A page for each family except the materials, and an index of these pages."""
     made: dict[str, str | bytes] = {}
     rows = []
     for kind, (family, _) in families.families().items():
@@ -48,6 +48,6 @@ def _page(kind: str, names: list[str]) -> str:
                 parts += [f"## {name}", markdown(page.doc)]
                 if page.formulas:
                     rows = [(f"`{one}`", escaped(text)) for one, text in page.formulas.items()]
-                    parts.append(table(("function", ""), rows))
+                    parts.append(table(("function", "description"), rows))
                 parts.append(f"Use: `{page.use}`. Source: `{page.source}`.")
     return "\n\n".join(parts) + "\n"

@@ -1,9 +1,9 @@
-"""The formulas of the models, as expressions that run: the book sets them, tests/docs/test_formulas.py evaluates them.
+"""The formulas of the models, as expressions that the book typesets and tests/docs/test_formulas.py evaluates.
 
-A formula is lines of `name = expression` in Python's syntax, the last of which is f, in 1/sr. Symbols: no, ni, nh, oh,
-oi are cosines between n (normal), o (wo), i (wi) and h (half vector); vr is that of the view and the mirrored light;
-ox, hx, ... are components in the local frame; f_base, f_a, f_b are values of the materials inside, E albedos at F = 1.
-All other names are parameters.
+A formula consists of lines `name = expression` in Python syntax; the last line defines f, in 1/sr. The symbols no, ni,
+nh, oh and oi are the cosines of the angles between n (normal), o (wo), i (wi) and h (half vector); vr is the cosine of
+the angle between the view direction and the mirrored light direction; ox, hx, ... are components in the local frame;
+f_base, f_a and f_b are values of nested materials; and E is the albedo for F = 1. All other names are parameters.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ f = f_base + f_add * f_ms""",
     "sum": "f = f_a + f_b",
 }
 
-# Those that refer to other materials, tables or random numbers, and no closed form of the directions.
+# formulas without a closed form in the directions: they depend on other materials, tables or random numbers
 SET = {
     "dielectric": [
         r"f_r = \frac{F\, D\, G}{4\, (n\cdot o)(n\cdot i)}",
@@ -152,16 +152,16 @@ FUNCTIONS = {"max": r"\max", "min": r"\min", "exp": r"\exp"}
 
 
 def of_model(name: str) -> list[str]:
-    """The formulas of a model in LaTeX, a line each; empty for a model that has none."""
+    """The formulas of a model in LaTeX, one per line; empty if the model has none."""
     lines = [latex(line) for line in RUN.get(name, "").splitlines()]
     return SET.get(name, []) + lines
 
 
 def latex(line: str) -> str:
-    """`name = expression` in LaTeX."""
+    """The line `name = expression` in LaTeX."""
     statement = ast.parse(line).body[0]
     if not (isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name)):
-        raise ValueError(f"a line of a formula is NAME = EXPRESSION, not: {line}")
+        raise ValueError(f"a line of a formula must be NAME = EXPRESSION, not: {line}")
     return f"{_latex(statement.targets[0])} = {_latex(statement.value)}"
 
 

@@ -1,4 +1,4 @@
-"""The gallery: a page for each folder of examples/, from its README.md, and an index with all pictures."""
+"""The gallery: a page for each folder in examples/, made from its README.md, and an index with all pictures."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)]+)\)")
 
 
 class Example(NamedTuple):
-    """A folder of examples/ with its page."""
+    """A folder in examples/, with its page."""
 
     folder: str
     title: str
-    picture: str  # file, in the folder
+    picture: str  # file name in the folder
     caption: str
     text: str
 
 
 def examples() -> list[Example]:
-    """Every folder with a page that shows a picture."""
+    """All folders whose page shows a picture."""
     found = []
     for page in sorted(EXAMPLES.glob("*/README.md")):
         text = page.read_text(encoding="utf-8")
@@ -47,7 +47,7 @@ def pages() -> dict[str, str | bytes]:
     )
     listed = "\n".join(example.folder for example in examples())
     made["gallery/index.md"] = (
-        "# Gallery\n\nEach page shows a picture with its scene and command, and says what to see in it and why.\n\n"
+        "# Gallery\n\nEach page shows a picture with its scene and its command, and explains the picture.\n\n"
         f":::::{{grid}} 1 2 3 3\n:gutter: 2\n\n{cards}\n:::::\n\n:::{{toctree}}\n:hidden:\n\n{listed}\n:::\n"
     )
     return made

@@ -1,7 +1,7 @@
-"""Write the pages that are made from the code into docs/reference, docs/gallery and docs/project, out of git.
+"""Generate pages from the code and write them to docs/reference, docs/gallery and docs/project, which git ignores.
 
-A file whose text has not changed is not touched, so that Sphinx rebuilds only what has. Parts whose inputs are as they
-were are not made again at all.
+Files whose text has not changed are not rewritten, so that Sphinx rebuilds only the changed pages. Parts whose inputs
+have not changed are not generated again.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from pathlib import Path
 from . import api, bibliography, errors, families, gallery, models, project, strips, substances
 
 ROOT = Path(__file__).parents[2]
-Pages = dict[str, str | bytes]  # path below docs/ -> contents
-SHOWN = "examples/all-models/*.py"  # the values at which models are shown
+Pages = dict[str, str | bytes]  # path relative to docs/ -> contents
+SHOWN = "examples/all-models/*.py"  # the parameter values with which models are shown
 
 PARTS: dict[str, tuple[Callable[[], Pages], tuple[str, ...]]] = {
     "reference/models": (models.pages, ("src/gonio/**/*.py", "docs/book/*.py", "docs/report-cards/cards.json", SHOWN)),
@@ -38,7 +38,7 @@ PARTS: dict[str, tuple[Callable[[], Pages], tuple[str, ...]]] = {
 
 
 def write_all(docs: Path) -> None:
-    """Make every part whose inputs have changed since it was made last; GONIO_BOOK=quick omits live pages and balls."""
+    """Generate every part whose inputs have changed; GONIO_BOOK=quick omits live pages and strips."""
     for folder, (make, inputs) in PARTS.items():
         if folder in ("reference/live", "reference/strips") and os.environ.get("GONIO_BOOK") == "quick":
             continue

@@ -1,4 +1,4 @@
-"""The end of a script that writes one page."""
+"""The last step of scripts that write one page: write the page, or compare it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Links that lead out of docs/ on disk, and lead to a page of the book in the book."""
+"""Links to files outside docs/, rewritten to the pages of the book that show these files."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "project/contributing.md", 
 
 
 def rewrite(app: Any, name: str, source: list[str]) -> None:
-    """Sphinx's source-read: the text of a page, with its links led to where the book has their target."""
+    """Handler of Sphinx's event source-read: rewrites the links of a page to the pages of the book."""
     folder = (DOCS / name).parent
     source[0] = LINK.sub(lambda link: _led(link, origin(name), folder), source[0])
-    if name in CARDS:  # these pages are shown on their own too, where a table of contents would be noise
+    if name in CARDS:  # on GitHub, these pages need no table of contents
         source[0] += "\n:::{toctree}\n:hidden:\n:glob:\n\n*\n:::\n"
 
 
 def origin(name: str) -> Path:
-    """The folder in which a page's links start: that of the file it is a copy of."""
+    """The folder to which a page's links are relative: that of the original file if the page is a copy."""
     kind, _, rest = name.partition("/")
     if kind == "project":
         return ROOT
@@ -56,7 +56,7 @@ def _led(link: re.Match[str], start: Path, folder: Path) -> str:
     path = Path(os.path.normpath(start / there))
     page = target(path)
     if page is None:
-        if not path.exists():  # a page that is made, or an error that Sphinx reports
+        if not path.exists():  # a generated page, or an error that Sphinx reports
             return link[0]
         if path.is_dir() or not path.is_relative_to(DOCS):
             return f"{text} (`{path.relative_to(ROOT).as_posix()}`)" if path.is_relative_to(ROOT) else link[0]

@@ -1,4 +1,4 @@
-"""Colors for listings that name no language: commands, and the Python that stands beside them."""
+"""Syntax highlighting for listings without a declared language: commands and Python code."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ PYTHON = re.compile(r"\s*(?:import |from |class |def |go\.|@|\w+ = )")
 
 
 def color(app: Any, doctree: Any) -> None:
-    """Sphinx's doctree-read: the language of each listing that has none, by its first line."""
+    """Handler of Sphinx's event doctree-read: guesses the language of each undeclared listing from its first line."""
     for block in doctree.findall(nodes.literal_block):
         if block.get("language", "text") in ("", "text", "none", "default"):
             first = block.astext().lstrip("\n").partition("\n")[0]
             block["language"] = "bash" if SHELL.match(first) else "python" if PYTHON.match(first) else "text"
-            block["force"] = True  # mixed listings are colored as far as they can be read
+            block["force"] = True  # highlight mixed listings as far as they can be parsed

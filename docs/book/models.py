@@ -1,4 +1,4 @@
-"""A page for each model: formula, live figure, parameters, use, laws, shader code and sources, all from the code."""
+"""A page for each model, generated from the code: formula, live page, parameters, use, laws, shader and sources."""
 
 from __future__ import annotations
 
@@ -28,19 +28,20 @@ GROUPS = {
     "layered": "Layered",
     "sheen": "Cloth",
     "historic": "Models of published fits",
-    "combined": "Composed of materials",
+    "combined": "Composed of other materials",
     "measured": "Measured",
 }
-# Layers that are off are left out of the first shader, so that the figure appears within a second in software WebGL.
+# Layers of weight 0 are omitted from the first shader, so that the figure appears within a second in software WebGL.
 OPENINGS = {
     "disney2015": "disney2015(base_color=0.1,0.35,0.6,roughness=0.35)",
     "openpbr": "openpbr(base_color=0.02,0.1,0.35,specular_roughness=0.3)",
 }
-BELOW = "The shader is the code below, run by your browser."
-WALKS = 256  # estimates in each cell of the table of a random model
+BELOW = "Your browser runs the shader code that is printed below."
+WALKS = 256  # random estimates per cell of the table of a stochastic model
 SYMBOLS = (
-    "$n$ is the normal, $o$ the direction to the viewer (`wo`), $i$ the direction to the light (`wi`), "
-    "$h$ the half vector, $r$ the light mirrored at $n$, $v = o$. $f$ is in 1/sr, without the cosine of `eval`."
+    "$n$ is the normal, $o$ the direction to the viewer (`wo`), $i$ the direction to the light (`wi`), $h$ the half "
+    "vector, $r$ the direction $i$ reflected about $n$, and $v = o$. $f$ is in 1/sr and, unlike `eval`, does not "
+    "include the cosine."
 )
 
 
@@ -52,7 +53,7 @@ def pages() -> dict[str, str | bytes]:
 
 
 def live() -> dict[str, str | bytes]:
-    """The page of `gonio view`, as one file without network, for each model, in the studio."""
+    """The page of `gonio view` for each model, in the studio, as a self-contained file."""
     made: dict[str, str | bytes] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in go.models():
@@ -62,9 +63,9 @@ def live() -> dict[str, str | bytes]:
 
 
 def opening(name: str, folder: Path) -> stage.Stage:
-    """What the live page of a model shows first: the material of the sheet of all models, in the studio.
+    """The initial state of a model's live page: the material of the sheet of all models, in the studio.
 
-    A random model, which has no shader code, is shown by its mean, above Kulla-Conty.
+    A stochastic model has no shader code; the page shows its mean in the upper row and Kulla-Conty in the lower row.
     """
     shown = go.material(OPENINGS[name]) if name in OPENINGS else strips.all_models.material(name)
     rows = [shown]
@@ -74,7 +75,7 @@ def opening(name: str, folder: Path) -> stage.Stage:
 
 
 def averaged(model: go.BSDF, folder: Path, estimates: int = WALKS) -> go.Measured:
-    """The mean of many estimates of a random model's values, as a table; the file is written to the folder."""
+    """A table of the mean of many estimates of a stochastic model; writes the table's file to the folder."""
 
     def mean(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
         many = dataclasses.replace(model, seed=np.repeat(np.arange(float(estimates)), len(wo)))
@@ -89,7 +90,7 @@ def averaged(model: go.BSDF, folder: Path, estimates: int = WALKS) -> go.Measure
 
 
 def operand(name: str) -> str:
-    """A model on the command line, with inner materials where it requires some: "mix(a=lambert,b=conductor)"."""
+    """A model in the notation of the command line, with required inner materials: "mix(a=lambert,b=conductor)"."""
     required = [key for key, parameter in go.models()[name].parameters().items() if parameter.required]
     inner = ["conductor"] if len(required) == 1 else ["lambert", "conductor"]
     given = ",".join(f"{key}={one}" for key, one in zip(required, inner, strict=False))
@@ -97,7 +98,7 @@ def operand(name: str) -> str:
 
 
 def first_line(model: type[go.BSDF]) -> str:
-    """The first sentence of a model's docstring, in one line."""
+    """The first sentence of a model's docstring, on one line."""
     return re.split(r"\. |\.$|:", " ".join(manual.page(model).doc.split("\n\n")[0].split()))[0]
 
 
@@ -106,11 +107,11 @@ def group(model: type[go.BSDF]) -> str:
 
 
 def _index() -> str:
-    lines = ["# Models", "", f"{len(go.models())} models. {SYMBOLS}", ""]
+    lines = ["# Models", "", f"Gonio has {len(go.models())} models. In the formulas, {SYMBOLS}", ""]
     for key, title in GROUPS.items():
         members = {name: model for name, model in go.models().items() if group(model) == key}
         rows = [(f"[{name}]({name}.md)", escaped(first_line(model))) for name, model in members.items()]
-        lines += [f"## {title}", "", table(("model", ""), rows), ""]
+        lines += [f"## {title}", "", table(("model", "description"), rows), ""]
         lines += [":::{toctree}", ":hidden:", "", *members, ":::", ""]
     return "\n".join(lines)
 
@@ -121,16 +122,16 @@ def _page(model: type[go.BSDF]) -> str:
     parts = [f"# {name}", markdown(found.doc), _strip(name), "## Formula"]
     parts += [f"$$\n{line}\n$$" for line in formulas.of_model(name)] + [SYMBOLS]
     if name in formulas.RUN:
-        parts.append("The formula is set from an expression that a test evaluates against the model.")
+        parts.append("The formula is typeset from an expression that a test compares with the code of the model.")
     parts += ["## Parameters", _parameters(found)]
     shader = _shader(name)
     frame = f'<iframe class="live" src="../../live/{name}.html" loading="lazy" title="{name}, live"></iframe>'
-    table_shown = f"The shader reads a table of the model's mean, {WALKS} estimates in each cell"
+    table_shown = f"In the upper row, the shader reads a table of the mean of {WALKS} random estimates per cell"
     parts += [
         "## Live",
-        "Turn the balls, open the lobe, move the sliders. "
-        + (f"{table_shown}; below it is Kulla-Conty." if model.stochastic else BELOW),
-        f":::{{dropdown}} {name} in this page\n```{{raw}} html\n{frame}\n```\n:::",
+        "You can rotate the balls, open the plot of the lobe, and move the sliders. "
+        + (f"{table_shown}; the lower row shows Kulla-Conty." if model.stochastic else BELOW),
+        f":::{{dropdown}} Live page of {name}\n```{{raw}} html\n{frame}\n```\n:::",
     ]
     parts += ["## Use", _use(found), "## Laws", _laws(found)]
     if shader is not None:
@@ -142,7 +143,7 @@ def _page(model: type[go.BSDF]) -> str:
 
 
 def _strip(name: str) -> str:
-    """Balls over the main parameter, which the part `reference/strips` renders; none in the quick book."""
+    """The strip of balls for the main parameter, rendered by the part `reference/strips`; none in the quick book."""
     labels = strips.labels(name)
     if len(labels) < 2:
         return ""
@@ -164,7 +165,7 @@ def _parameters(found: manual.Page) -> str:
 def _use(found: manual.Page) -> str:
     name = found.name
     required = [row for row in found.parameters if row.default == "required"]
-    if required:  # another material, or a file
+    if required:  # another material or a file is required
         return f"Python: `go.{found.title}`. Scenes: the type `gonio-{name}`. Mitsuba: the plugin `{found.plugin}`."
     verbs = ("view {}", "plot {} -o plot.png", "verify {}", "render {} -o ball.png")
     commands = "\n".join(f"gonio {verb.format(name)}" for verb in verbs)
@@ -175,7 +176,7 @@ def _use(found: manual.Page) -> str:
         (
             fenced(commands, "bash"),
             fenced(python, "python"),
-            "In a scene, and in Mitsuba after `import gonio.mitsuba`:",
+            "In a scene, and in Mitsuba after `import gonio.mitsuba`, write:",
             fenced(scene, "json"),
             fenced(xml, "xml"),
         )
@@ -183,19 +184,21 @@ def _use(found: manual.Page) -> str:
 
 
 def _laws(found: manual.Page) -> str:
-    lines = [f"Violates the law **{law}** by design: {escaped(reason)}." for law, reason in found.breaks.items()]
+    lines = [
+        f"The model violates the law **{law}** by design: {escaped(reason)}." for law, reason in found.breaks.items()
+    ]
     card = ROOT / f"docs/report-cards/{found.name}.md"
     if card.exists():
-        lines.append(f"All test results are on its [report card](../../report-cards/{found.name}.md).")
+        lines.append(f"For all test results, see its [report card](../../report-cards/{found.name}.md).")
     else:
-        lines.append(f"`gonio verify {found.name} -o card` tests it and writes its report card.")
+        lines.append(f"`gonio verify {found.name} -o card` tests the model and writes its report card.")
     return "\n\n".join(lines)
 
 
 def _shader(name: str) -> str | None:
     try:
         return go.emit(operand(name), lean=True)
-    except go.InputError:  # needs a file, or is random
+    except go.InputError:  # the model needs a file, or is stochastic
         return None
 
 

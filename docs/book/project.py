@@ -1,4 +1,4 @@
-"""The files of the repository's root that are chapters of the book."""
+"""Files in the root of the repository that are chapters of the book."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def pages() -> dict[str, str | bytes]:
-    """Contributing and the changes, as they are."""
+    """Unchanged copies of CONTRIBUTING.md and CHANGELOG.md."""
     return {
         f"project/{name.lower()}.md": (ROOT / f"{name}.md").read_text(encoding="utf-8")
         for name in ("CONTRIBUTING", "CHANGELOG")

@@ -1,4 +1,7 @@
-"""A strip of five balls for each model: its main parameter from low to high, all else as on the sheet of all models."""
+"""A strip of five balls for each model, with its main parameter from low to high.
+
+All other parameters are those of the contact sheet in examples/all-models.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ import all_models  # noqa: E402
 
 SCENE = ROOT / "examples" / "conductor-ggx" / "print.json"
 SIZE = (800, 210)
-# where the row of `gonio view` has one ball only, or begins with a parameter that shows less
+# models for which the row in `gonio view` has only one ball, or varies a parameter with less visible effect
 CHOSEN: dict[str, tuple[str, tuple[float, ...]]] = {
     "ashikhmin-shirley": ("exponent", (10.0, 40.0, 160.0, 640.0, 2560.0)),
     "disney": ("roughness", (0.1, 0.3, 0.5, 0.7, 0.9)),
@@ -39,13 +42,13 @@ def pages() -> dict[str, str | bytes]:
 
 
 def all_series() -> dict[str, list[tuple[str, go.BSDF]]]:
-    """Model -> label and material of each ball; models without a main parameter have none."""
+    """Label and material of each ball, by model; models without a main parameter are omitted."""
     found = {name: series(all_models.material(name)) for name in go.models()}
     return {name: balls for name, balls in found.items() if len(balls) > 1}
 
 
 def series(material: go.BSDF) -> list[tuple[str, go.BSDF]]:
-    """The balls of the row that `gonio view` opens with, or those of `CHOSEN`."""
+    """The balls in the first row of `gonio view`, or those of `CHOSEN`."""
     if material.name in CHOSEN:
         parameter, values = CHOSEN[material.name]
         return [(f"{parameter} {value:g}", stage.replaced(material, {parameter: value})) for value in values]
@@ -54,12 +57,12 @@ def series(material: go.BSDF) -> list[tuple[str, go.BSDF]]:
 
 
 def labels(name: str) -> list[str]:
-    """The values of a strip in words."""
+    """The labels of the balls in a strip."""
     return [label for label, _ in series(all_models.material(name))]
 
 
 def strip(balls: list[tuple[str, go.BSDF]], size: tuple[int, int] = SIZE, spp: int = 16) -> np.ndarray:
-    """Five balls in a row, linear."""
+    """The rendered picture of five balls in a row, in linear values."""
     changes: dict[str, Any] = {f"shapes.{number}.material": material for number, (_, material) in enumerate(balls)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", go.GonioWarning)  # highlights clip

@@ -1,4 +1,4 @@
-"""The substances with their curves of n and k, and the named materials with all their fits."""
+"""Pages of the substances, with plots of n and k, and of the named materials, with all their fits."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ WAVELENGTHS = np.arange(380.0, 781.0, 5.0)
 
 
 def pages() -> dict[str, str | bytes]:
-    """Two pages and a picture for each substance."""
+    """The two pages, and a plot for each substance."""
     made: dict[str, str | bytes] = {"reference/substances/materials.md": _materials()}
     lines = [
         "# Substances",
         "",
-        'Refractive indices by name: `eta="bk7"` in a dielectric, `preset="Au"` in a conductor, '
-        "`go.refractive_index(name, wavelength)` in Python. Curves run over the visible spectrum, 380 to 780 nm.",
+        'To use a refractive index by name, write `eta="bk7"` in a dielectric, `preset="Au"` in a conductor, or '
+        "`go.refractive_index(name, wavelength)` in Python. The plots cover the visible spectrum, 380 to 780 nm.",
         "",
     ]
     for name, constants in go.indices().items():
@@ -60,10 +60,10 @@ def _materials() -> str:
         [
             "# Named materials",
             "",
-            f"{len(rows)} materials by name, each a published fit to the MERL measurements: "
-            f'`gonio render {go.materials()[0]} -o a.png`, `go.material("{go.materials()[0]}")`. The default fit is '
-            f"`{library.DEFAULT}`; another is written "
-            "`NAME:FILE/FIT`. [How accurate they are](../../published-fits.md).",
+            f"There are {len(rows)} named materials, each with published fits to MERL measurements. Use a name as in "
+            f'`gonio render {go.materials()[0]} -o a.png` or `go.material("{go.materials()[0]}")`. The default fit is '
+            f"`{library.DEFAULT}`; to select another one, write "
+            "`NAME:FILE/FIT`. See [how accurate the fits are](../../published-fits.md).",
             "",
             table(("material", "fits"), rows),
             "",

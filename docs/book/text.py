@@ -1,4 +1,4 @@
-"""Docstrings of this project as Markdown: prose, listings, formulas in lines of their own, tables of arguments."""
+"""Conversion of docstrings to Markdown: prose, listings, displayed formulas and tables of arguments."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _blocks(paragraph: str) -> Iterator[str]:
 
 
 def _rows(lines: Sequence[str]) -> Iterator[str]:
-    """ "name  meaning" lines as a table; what stands before and after them as prose."""
+    """Lines of the form "name  meaning" as a table, with the lines before and after them as prose."""
     before: list[str] = []
     rows: list[list[str]] = []
     after: list[str] = []
@@ -44,28 +44,28 @@ def _rows(lines: Sequence[str]) -> Iterator[str]:
             (after if rows else before).append(line.strip())
     if before:
         yield escaped(" ".join(before))
-    yield table(("", "meaning"), ((f"`{name}`", escaped(text)) for name, text in rows))
+    yield table(("name", "meaning"), ((f"`{name}`", escaped(text)) for name, text in rows))
     if after:
         yield escaped(" ".join(after))
 
 
 def table(head: Sequence[str], rows: Iterator[Sequence[str]] | Sequence[Sequence[str]]) -> str:
-    """A table in Markdown; cells are Markdown already."""
+    """A table in Markdown; the cells are given as Markdown."""
     lines = [" | ".join(head), " | ".join("---" for _ in head), *(" | ".join(row) for row in rows)]
     return "\n".join(f"| {line} |" for line in lines)
 
 
 def escaped(text: str) -> str:
-    """Plain text as Markdown; `code` in it stays code."""
+    """Plain text escaped as Markdown; `code` in backquotes remains code."""
     return "".join(part if part.startswith("`") else SPECIAL.sub(r"\\\1", part) for part in QUOTED.split(text))
 
 
 def cell(text: str) -> str:
-    """Markdown in one cell of a table."""
+    """Markdown for a single cell of a table."""
     return re.sub(r"\s+", " ", text).replace("|", "\\|").strip()
 
 
 def fenced(text: str, language: str = "text") -> str:
-    """A listing."""
+    """A fenced listing."""
     fence = "`" * max(3, max((len(run) for run in re.findall(r"`+", text)), default=0) + 1)
     return f"{fence}{language}\n{text.strip(chr(10))}\n{fence}"

@@ -1,6 +1,6 @@
-"""What is measured of an engine: white furnaces, trials that isolate a cause, and the causes.
+"""The measurements for an engine: white furnaces, trials that isolate a cause, and the causes.
 
-A cause names functions and tables of the engine. Figures in it come from the trials; `{name}` stands for one.
+The text of a cause names functions and tables of the engine. `{name}` in it is replaced by that value of the trials.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from gonio.material import BSDF
 
 COSINES = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
 ROUGHNESSES = (0.1, 0.25, 0.5, 0.75, 1.0)
-Make = Callable[..., BSDF]  # a material of a class by its parameters
+Make = Callable[..., BSDF]  # constructs a material from its parameters
 
 
 class Furnace(NamedTuple):
-    """A white furnace: the material, and its parameters for a roughness.
+    """A white furnace: the material, and its parameters as a function of roughness.
 
-    title    its key in cards.json and in the output of the programs
-    heading  its name on the page and in the picture; empty: the title
+    title    key in cards.json and in the output of the programs
+    heading  name on the page and in the picture; if empty, the title is used
     """
 
     title: str
@@ -33,30 +33,30 @@ class Furnace(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The name to print."""
+        """The name on the page and in the picture."""
         return self.heading or self.title
 
 
 class Engine(NamedTuple):
-    """What is measured of an engine.
+    """The measurements for an engine, and the texts of its report card.
 
-    package    of npm
+    package    name of the npm package
     page       name of the page, its picture and its programs, without suffix
-    title      and `home`, the address of the repository
+    title      name of the engine; `home` is the address of its repository
     intro      sentences above the tables
     materials  the shaders to verify
-    furnaces   white furnaces, one table each; `remarks` on them, by title
-    trials     folder of the adopted shaders -> figures that isolate causes
-    sections   figures by version -> further sections of the page
-    causes     (material, law) or (material, law, version) -> cause and remedy
-    programs   files of report-cards/engines/programs that show it without Gonio
-    origin     where a release comes from, as the page words it
-    source     the first words of the page with `{version}` in them; empty: package, release and origin
-    again      for an engine that is not on npm: the commands that make the folder of shaders, `{version}` in them
-    made       the folder of a release holds the shaders and adapters themselves
+    furnaces   white furnaces, one table each; `remarks` on them are keyed by title
+    trials     maps the folder of the adopted shaders to values that isolate causes
+    sections   maps these values, keyed by version, to further sections of the page
+    causes     cause and remedy, keyed by (material, law) or (material, law, version)
+    programs   files of report-cards/engines/programs that reproduce findings without Gonio
+    origin     where a release comes from, as printed on the page
+    source     the tested release as printed on the page, with `{version}`; if empty, package, release and origin
+    again      for an engine that is not on npm: commands that create the folder of shaders, with `{version}`
+    made       whether the folder of a release already contains the shaders and adapters
     language   suffix of the shaders
-    laws       the laws to judge by, all if empty
-    tsl        its TSL build is measured too
+    laws       the laws to test; all laws if empty
+    tsl        whether the TSL build is measured, too
     """
 
     package: str
@@ -86,29 +86,29 @@ def material(folder: Path, name: str, **parameters: float) -> Any:
 
 
 def shader(folder: Path, name: str) -> Path:
-    """The file of a material."""
+    """Path of a material's shader file."""
     return next(one for one in (folder / f"{name}.glsl", folder / f"{name}.wgsl") if one.is_file())
 
 
 def furnace(one: BSDF, cosines: tuple[float, ...] = COSINES) -> list[float]:
-    """Albedo of the first channel at each cosine."""
+    """Directional albedo of the first channel at each cosine of the view angle."""
     return [float(value) for value in np.asarray(go.albedo(one, mu=list(cosines)).value)[..., 0]]
 
 
 @functools.cache
 def single_scattering(roughness: float, cosines: tuple[float, ...]) -> list[float]:
-    """E of GGX with the height-correlated Smith term at F = 1."""
+    """Directional albedo E of GGX with the height-correlated Smith term and F = 1."""
     return furnace(go.Metal(r0=1.0, edge=1.0, alpha=roughness * roughness), cosines)
 
 
 def asymmetry(one: BSDF, count: int = 4000) -> float:
-    """Largest relative difference of f(wo, wi) and f(wi, wo), of pairs to 89 degrees."""
+    """Largest relative difference between f(wo, wi) and f(wi, wo), for directions up to 89 degrees."""
     wo, wi = _pairs(count)
     return _apart(*(np.asarray(one.f(*pair, precision="float64")) for pair in ((wo, wi), (wi, wo))))
 
 
 def difference(one: BSDF, other: BSDF, count: int = 4000) -> float:
-    """Largest relative difference of two materials, of pairs to 89 degrees."""
+    """Largest relative difference between two materials, for directions up to 89 degrees."""
     return _apart(*(np.asarray(each.eval(*_pairs(count), precision="float64")) for each in (one, other)))
 
 

@@ -10,21 +10,21 @@ from .base import Engine, Furnace, furnace, material, single_scattering
 
 PLACES = ((0.25, 1.0), (0.5, 1.0), (0.75, 1.0), (1.0, 1.0), (1.0, 0.5), (1.0, 0.25))
 
-INTRO = """This card tests the lighting of `StandardMaterial` by a directional light: `Fd_Burley`, `specular`,
-`specular_anisotropy` and `specular_clearcoat` of `pbr_lighting.wgsl`, combined as in `directional_light`. Environments,
-area lights and transmission are not tested. The feature `dfg_lut`, which is not enabled by default, is off, so that
-`F_AB` is a polynomial; with the feature enabled, `F_AB` is read from a table, which was not tested."""
+INTRO = """This card covers the lighting of `StandardMaterial` by a directional light: `Fd_Burley`, `specular`,
+`specular_anisotropy` and `specular_clearcoat` of `pbr_lighting.wgsl`, combined as in `directional_light`. Environment
+maps, area lights and transmission are not tested. The feature `dfg_lut` is off, as it is by default, and `F_AB` is
+therefore a polynomial. With the feature enabled, `F_AB` is read from a table; this variant was not tested."""
 
 
 def polynomial(rough: float, cosine: float) -> float:
-    """A + B of the split sum's polynomial (Karis, Physically Based Shading on Mobile, 2014)."""
+    """A + B of the split sum, approximated by a polynomial (Karis, Physically Based Shading on Mobile, 2014)."""
     x, y, z, w = rough * np.array([-1.0, -0.0275, -0.572, 0.022]) + np.array([1.0, 0.0425, 1.04, -0.04])
     a004 = min(x * x, 2.0 ** (-9.28 * cosine)) * x + y
     return float((-1.04 * a004 + z) + (1.04 * a004 + w))
 
 
 def trials(folder: Path) -> dict[str, float]:
-    """White metal: E of the lobe, the polynomial's, and the albedo that both give."""
+    """For white metal, E of the lobe, A + B, their ratio, and the shader's albedo; peaks of dark materials."""
     figures = {}
     for rough, cosine in PLACES:
         key = f"{rough:g}_{cosine:g}"
@@ -35,7 +35,7 @@ def trials(folder: Path) -> dict[str, float]:
             f"expected_{key}": exact / fit,
             f"shader_{key}": furnace(material(folder, "bevy-standard", rough=rough), (cosine,))[0],
         }
-    for rough in (0.5, 0.7):  # a dark color, for which the compensation is next to 1
+    for rough in (0.5, 0.7):  # a dark color, for which the compensation factor is close to 1
         normal = np.array([[0.0, 0.0, 1.0]])
         for name, settings in (
             ("anisotropic", {"rough": rough, "strength": 0.0}),
@@ -49,7 +49,7 @@ def trials(folder: Path) -> dict[str, float]:
 
 
 def sections(figures: dict[str, dict[str, float]]) -> str:
-    """The polynomial against the integral."""
+    """The comparison of the polynomial with the exact integral, and the roughness of anisotropic materials."""
     last = list(figures.values())[-1]
     rows = "\n".join(
         f"| {rough:g} | {cosine:g} | "
@@ -64,46 +64,47 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     )
     return f"""## The polynomial behind the energy compensation
 
-`specular_multiscatter` multiplies the lobe by 1 + F0 (1 / (A + B) - 1), where A + B = `F_AB` should equal E, the
-albedo of the lobe at F = 1, so that white metal returns E / E = 1. Without `DFG_LUT`, A + B is Karis's polynomial for
-mobile devices, which was fitted to the split sum for environment lighting and is not E of `V_SmithGGXCorrelated`. The
-sum A + B does not depend on n.v at all, because the terms that contain n.v cancel:
+`specular_multiscatter` multiplies the lobe by 1 + F0 (1 / (A + B) - 1). The sum A + B, `F_AB`, should equal E, the
+albedo of the lobe at F = 1; the albedo of white metal would then be E / E = 1. Without `DFG_LUT`, A + B is Karis's
+polynomial for mobile devices. It was fitted to the split sum for environment lighting and differs from E of
+`V_SmithGGXCorrelated`. It does not even depend on n.v, because the terms that contain n.v cancel in the sum. The table
+compares A + B with E:
 
-| roughness | n.v | E (integral) | A + B | E / (A + B) | white metal of the shader |
+| roughness | n.v | exact E | A + B | E / (A + B) | albedo of white metal |
 |---|---|---|---|---|---|
 {rows}
 
-To check this by hand: at n.v 1 and roughness 1, the polynomial gives -0.572 + 1.04 + 0.022 - 0.04 = 0.45, whereas E of
-GGX with alpha 1 is 1 - ln 2 = 0.307 at this angle. Remedy: use the table of `dfg_lut` by default, or a fit to E of the
-lobe that is used.
+The result can be checked by hand: at n.v 1 and roughness 1, the polynomial gives -0.572 + 1.04 + 0.022 - 0.04 = 0.45,
+whereas E of GGX with alpha 1 is 1 - ln 2 = 0.307 at normal incidence. Remedy: use the table of `dfg_lut` by default, or
+fit a polynomial to E of this lobe.
 
 ## The roughness of anisotropic materials
 
 `specular_anisotropy` sets `ab = roughness * roughness`, but its argument is `layers[LAYER_BASE].roughness`, which
 `perceptualRoughnessToRoughness` has already squared. Alpha is therefore the fourth power of the perceptual roughness,
-and a material becomes glossier when anisotropy is enabled. The table gives BRDF times cosine at
-normal incidence, with color 0.001:
+and a material becomes glossier when anisotropy is enabled. The table gives the product of BRDF and cosine at normal
+incidence, for color 0.001:
 
-| perceptual roughness r | anisotropic, strength 0 | isotropic at r | isotropic at r^2 |
+| perceptual roughness r | anisotropic, strength 0 | isotropic, roughness r | isotropic, roughness r^2 |
 |---|---|---|---|
 {peaks}
 
 KHR_materials_anisotropy of glTF specifies `mix(alpha, 1, strength^2)` with alpha = r^2. Remedy: set `ab = roughness`.
-Moreover, `V_GGX_anisotropic` ends in `saturate(v)`, although v exceeds 1 at grazing angles: see the same term of
-[glTF-Sample-Viewer](gltf-viewer.md#the-clamp-of-the-anisotropic-masking-term)."""
+In addition, `V_GGX_anisotropic` returns `saturate(v)`, although v exceeds 1 at grazing angles;
+[glTF-Sample-Viewer](gltf-viewer.md#the-clamp-of-the-anisotropic-masking-term) has the same error."""
 
 
 _METAL = (
-    "The polynomial `F_AB` is not E of the lobe: see above. Remedy: use the table of `dfg_lut`, or a fit to E of the "
-    "lobe."
+    "The polynomial `F_AB` differs from E of the lobe: see [above](#the-polynomial-behind-the-energy-compensation). "
+    "Remedy: use the table of `dfg_lut`, or fit a polynomial to E of the lobe."
 )
 _COLOR = (
-    "`specular_multiscatter` multiplies F by 1 + F0 (1 / (A + B) - 1), so that the result is quadratic in color, as "
-    "with every compensation of this kind; light that is reflected twice is colored twice."
+    "`specular_multiscatter` multiplies F by 1 + F0 (1 / (A + B) - 1). The result is therefore quadratic in color, as "
+    "with every compensation of this kind: light that is reflected twice is tinted twice."
 )
 _DIGITS = (
-    "`D_GGX` computes 1 - NdotH * NdotH, which is the difference of two numbers close to 1 near the center of the "
-    "lobe. Remedy: compute it as the squared length of cross(N, H), as in Filament."
+    "Near the center of the lobe, 1 - NdotH * NdotH in `D_GGX` loses digits to cancellation. Remedy: compute it as the "
+    "squared length of cross(N, H), as in Filament."
 )
 CAUSES = {
     ("bevy-standard", "energy"): _METAL,
@@ -114,9 +115,9 @@ CAUSES = {
     ("bevy-anisotropic", "linearity"): _COLOR,
     ("bevy-standard", "precision"): _DIGITS,
     ("bevy-coat", "precision"): _DIGITS,
-    ("bevy-coat", "positivity"): "`V_Kelemen` divides by LdotH * LdotH without a lower bound. At grazing angles from "
-    "opposite sides, the quotient overflows; with coat = 0, the product is then infinity times 0. Remedy: a lower "
-    "bound on LdotH.",
+    ("bevy-coat", "positivity"): "`V_Kelemen` divides by LdotH * LdotH without a lower bound. If both directions are "
+    "grazing and on opposite sides, the quotient overflows; with coat = 0, infinity is then multiplied by 0. Remedy: "
+    "impose a lower bound on LdotH.",
 }
 
 ENGINE = Engine(
@@ -138,18 +139,21 @@ ENGINE = Engine(
         ),
     ),
     remarks={
-        "White metal": "See [the polynomial](#the-polynomial-behind-the-energy-compensation).",
+        "White metal": "See [the polynomial behind the energy "
+        "compensation](#the-polynomial-behind-the-energy-compensation).",
         "White dielectric": "`directional_light` adds the diffuse and specular lobes without reducing the diffuse lobe "
-        "by the light that the specular lobe reflects. `Fd_Burley` also gains light at high roughness.",
-        "White metal, anisotropy 0.7": "See [the roughness](#the-roughness-of-anisotropic-materials).",
-        "White dielectric, coat of this roughness": "The base has roughness 0.5 and is weighted by 1 - Fc at the "
-        "half vector of each light, as in Filament: at grazing view angles, Fc is small for most light directions.",
+        "by the light that the specular lobe reflects. `Fd_Burley` also gains energy at high roughness.",
+        "White metal, anisotropy 0.7": "See [the roughness of anisotropic "
+        "materials](#the-roughness-of-anisotropic-materials).",
+        "White dielectric, coat of this roughness": "The base has roughness 0.5. It is weighted by 1 - Fc, where Fc is "
+        "the Fresnel term of the coat at the half vector of each light, as in Filament. At grazing view angles, Fc is "
+        "small for most light directions.",
     },
     trials=trials,
     sections=sections,
     causes=CAUSES,
     programs=(),
-    origin="its repository (commit c6f634ca9f)",
+    origin="GitHub (commit c6f634ca9f)",
     again="git clone --depth 1 --branch v{version} https://github.com/bevyengine/bevy bevy-{version}\n"
     "gonio adopt bevy-{version} -o bevy",
     language="wgsl",

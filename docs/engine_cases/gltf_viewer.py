@@ -1,4 +1,4 @@
-"""glTF-Sample-Viewer: furnaces, the clamp of its anisotropic masking term, and causes."""
+"""glTF-Sample-Viewer: white furnaces, the clamp of its anisotropic masking term, and causes."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from pathlib import Path
 
 from .base import Engine, Furnace, furnace, material
 
-INTRO = """This is the reference viewer for glTF. The card tests `BRDF_lambertian`, `BRDF_specularGGX` and
-`BRDF_specularGGXAnisotropy`, mixed by the Fresnel terms as in the shader's loop over lights. Sheen, clear coat,
-iridescence, transmission and environments are not tested."""
+INTRO = """glTF-Sample-Viewer is the reference viewer for glTF. This card covers `BRDF_lambertian`, `BRDF_specularGGX`
+and `BRDF_specularGGXAnisotropy`, blended by the Fresnel terms as in the shader's loop over lights. Sheen, clear coat,
+iridescence, transmission and environment maps are not tested."""
 
 
 def trials(folder: Path) -> dict[str, float]:
-    """Narrow lobes with the anisotropic term at strength 0, and with the other one."""
+    """Albedos of narrow lobes with the isotropic term, and with the anisotropic term at strength 0."""
     figures = {}
     for rough in (0.25, 0.5):
         settings = {"rough": rough, "strength": 0.0}
@@ -24,7 +24,7 @@ def trials(folder: Path) -> dict[str, float]:
 
 
 def sections(figures: dict[str, dict[str, float]]) -> str:
-    """The clamp."""
+    """The section on the clamp."""
     last = list(figures.values())[-1]
     rows = "\n".join(
         f"| {rough:g} | {cosine} | {last[f'plain_{rough:g}_{key}']:.3f} | {last[f'clamped_{rough:g}_{key}']:.3f} |"
@@ -34,29 +34,28 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     return f"""## The clamp of the anisotropic masking term
 
 `V_GGX_anisotropic` ends in `clamp(v, 0.0, 1.0)`. V is G / (4 n.l n.v), which is 1/4 at normal incidence and exceeds 1
-where n.l n.v < G / 4, that is, at grazing angles. There, the clamp loses light. `V_GGX` has no such clamp. The albedo
-of white metal with anisotropy 0, for which both terms are the same function, is:
+where n.l n.v < G / 4, that is, at grazing angles. The clamp loses energy there. `V_GGX` has no such clamp, but is
+otherwise the same function if the anisotropy is 0. The table gives the albedo of white metal with anisotropy 0:
 
 | roughness | n.v | `BRDF_specularGGX` | `BRDF_specularGGXAnisotropy` |
 |---|---|---|---|
 {rows}
 
-Remedy: use `max(v, 0.0)`, or the test for a positive denominator that `V_GGX` uses."""
+Remedy: use `max(v, 0.0)`, or test for a positive denominator, as `V_GGX` does."""
 
 
 CAUSES = {
-    ("gltf-standard", "precision"): "`D_GGX` computes `NdotH^2 (a2 - 1) + 1`, which is the difference of two "
-    "numbers close to 1 near the center of the lobe. Remedy: compute 1 - NdotH^2 as the squared length of cross(n, h), "
-    "as in Filament.",
-    ("gltf-standard", "energy"): "A specular lobe is added over a white base; see the white-furnace results for the "
-    "white dielectric.",
+    ("gltf-standard", "precision"): "Near the center of the lobe, `NdotH^2 (a2 - 1) + 1` in `D_GGX` loses digits to "
+    "cancellation. Remedy: compute 1 - NdotH^2 as the squared length of cross(n, h), as in Filament.",
+    ("gltf-standard", "energy"): "The specular lobe is added to a white base that is attenuated too little; see the "
+    "white-furnace results for the white dielectric.",
     (
         "gltf-anisotropic",
         "positivity",
-    ): "At roughness 0 and strength 0, both widths of `D_GGX_anisotropic` are so small "
-    "that a2 / dot(f, f) is 0 / 0. Remedy: a lower bound also on the tangential width, `at`.",
-    ("gltf-standard", "positivity"): "At roughness 0, `D_GGX` divides 0 by 0 where h is the normal. Remedy: a lower "
-    "bound on alpha.",
+    ): "At roughness 0 and strength 0, both alphas of `D_GGX_anisotropic` are so small that a2 / dot(f, f) is 0 / 0. "
+    "Remedy: impose a lower bound on `at`, the alpha along the tangent, as well.",
+    ("gltf-standard", "positivity"): "At roughness 0, `D_GGX` divides 0 by 0 if h is the normal. Remedy: impose a "
+    "lower bound on alpha.",
 }
 
 ENGINE = Engine(
@@ -75,9 +74,9 @@ ENGINE = Engine(
         "White metal": "The lobe models single scattering only, without compensation, as in the specification; the "
         "loss is that of single-scattering GGX.",
         "White dielectric": "The diffuse and specular lobes are blended with `mix`, using F at the half vector for "
-        "each light, as in appendix B of the specification. At grazing view angles, v.h is large and F small for most "
-        "light directions, so the diffuse lobe keeps nearly its full weight, although the specular lobe reflects far "
-        "more than this F suggests.",
+        "each light, as in appendix B of the specification. At grazing view angles, v.h is large and F(v.h) is small "
+        "for most light directions. The diffuse lobe therefore has nearly its full weight, although the albedo of the "
+        "specular lobe is much larger than these values of F.",
     },
     trials=trials,
     sections=sections,

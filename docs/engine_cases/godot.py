@@ -1,4 +1,4 @@
-"""Godot: furnaces, its two masking terms, its clear coat, and causes."""
+"""Godot: white furnaces, its two masking terms, its clear coat, and causes."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from .base import Engine, Furnace, furnace, material, single_scattering
 
 PLACES = ((0.25, 0.05), (0.25, 0.25), (0.5, 0.25), (0.5, 1.0), (0.75, 0.5), (1.0, 0.5))
 
-INTRO = """This card tests `light_compute` of the clustered forward renderer, with one directional light and the
-settings of `StandardMaterial3D`: Burley's diffuse lobe and GGX, with clear coat and anisotropy. Environments, rim,
+INTRO = """This card covers `light_compute` of the clustered forward renderer, with one directional light and the
+settings of `StandardMaterial3D`: Burley's diffuse lobe and GGX, with clear coat and anisotropy. Environment maps, rim,
 backlight and transmittance are not tested. Unlike the renderer, this test does not round roughness and metallic to 8
 bits. Later releases multiply the lobe by an energy-compensation factor, which was not tested."""
 
 
 def trials(folder: Path) -> dict[str, float]:
-    """White metal by both masking terms beside the integral, and with and without a coat."""
+    """Albedo of white metal with both masking terms, its exact value, and albedos with and without a coat."""
     figures = {}
     for rough, cosine in PLACES:
         key = f"{rough:g}_{cosine:g}"
@@ -35,7 +35,7 @@ def trials(folder: Path) -> dict[str, float]:
 
 
 def sections(figures: dict[str, dict[str, float]]) -> str:
-    """The masking terms, and the coat."""
+    """The sections on the masking terms and the coat."""
     last = list(figures.values())[-1]
     rows = "\n".join(
         f"| {rough:g} | {cosine:g} | "
@@ -51,46 +51,46 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
 
 `V_GGX` is Hammon's approximation, 0.5 / mix(2 n.l n.v, n.l + n.v, alpha) (PBR Diffuse Lighting for GGX+Smith
 Microsurfaces, 2017); `V_GGX_anisotropic` is the exact height-correlated Smith term. At strength 0, both describe
-the same surface, yet a material becomes brighter when anisotropy is enabled. The albedo of white metal is:
+the same surface, yet a material becomes brighter when anisotropy is enabled. The table gives the albedo of white metal:
 
-| roughness | n.v | E (integral) | `V_GGX` | `V_GGX_anisotropic` |
+| roughness | n.v | exact E | with `V_GGX` | with `V_GGX_anisotropic` |
 |---|---|---|---|---|
 {rows}
 
-To check this by hand: for n.l = n.v = 1/4 and alpha = 1/4, V is 0.5 / (0.25 sqrt(1/16 + 15/256) 2) = 2.87 with Smith's
-term and 0.5 / (0.75 / 8 + 0.25 / 2) = 2.29 with Hammon's. Remedy: call `V_GGX_anisotropic` with two equal widths, or
-use the exact isotropic Smith term, which has two square roots.
+The result can be checked by hand: for n.l = n.v = 1/4 and alpha = 1/4, V is 0.5 / (0.25 sqrt(1/16 + 15/256) 2) = 2.87
+with Smith's term and 0.5 / (0.75 / 8 + 0.25 / 2) = 2.29 with Hammon's. Remedy: call `V_GGX_anisotropic` with two equal
+alphas, or use the exact isotropic Smith term, which requires two square roots.
 
-## The clear coat is added
+## The clear coat does not attenuate the base
 
-As a comment in `light_compute` says, the base is not reduced by the light that the coat reflects. The albedo of white
-metal of roughness 0.5, without a coat and with a coat of roughness 0.1, is:
+As a comment in `light_compute` states, the base is not reduced by the light that the coat reflects. The table gives the
+albedo of white metal of roughness 0.5, without a coat and with a coat of roughness 0.1:
 
 | n.v | without coat | with coat |
 |---|---|---|
 {coats}
 
-Remedy: multiply the base's `diffuse_light` and `specular_light` by 1 - F of the coat, as in Filament. `Gr` divides by
-`cLdotH * cLdotH` without a lower bound: see [Bevy](bevy.md)."""
+Remedy: multiply the base's `diffuse_light` and `specular_light` by 1 - F of the coat, as in Filament. In addition,
+`Gr` divides by `cLdotH * cLdotH` without a lower bound; the coat of [Bevy](bevy.md) has the same error."""
 
 
 _ADDED = (
     "`light_compute` adds the diffuse and specular lobes without reducing the diffuse lobe by the light that the "
     "specular lobe reflects. See the white-furnace results for the white dielectric."
 )
-_COAT = "The coat is added without reducing the base: see above."
+_COAT = "The coat is added without reducing the base: see [above](#the-clear-coat-does-not-attenuate-the-base)."
 _DIGITS = (
-    "`D_GGX` computes 1 - NdotH * NdotH, which is the difference of two numbers close to 1 near the center of the "
-    "lobe. Remedy: compute it as the squared length of cross(N, H), as in Filament."
+    "Near the center of the lobe, 1 - NdotH * NdotH in `D_GGX` loses digits to cancellation. Remedy: compute it as the "
+    "squared length of cross(N, H), as in Filament."
 )
 CAUSES = {
     ("godot-standard", "energy"): _ADDED,
     ("godot-anisotropic", "energy"): _ADDED,
     ("godot-coat", "energy"): _COAT,
     ("godot-coat", "precision"): _DIGITS,
-    ("godot-coat", "positivity"): "`Gr` divides by cLdotH * cLdotH without a lower bound. At grazing angles from "
-    "opposite sides, the quotient overflows; with coat = 0, the product is then infinity times 0. Remedy: a lower "
-    "bound on cLdotH, as in later releases.",
+    ("godot-coat", "positivity"): "`Gr` divides by cLdotH * cLdotH without a lower bound. If both directions are "
+    "grazing and on opposite sides, the quotient overflows; with coat = 0, infinity is then multiplied by 0. Remedy: "
+    "impose a lower bound on cLdotH, as in later releases.",
 }
 
 ENGINE = Engine(
@@ -113,12 +113,12 @@ ENGINE = Engine(
     ),
     remarks={
         "White metal": "The lobe models single scattering only, without compensation, and loses more light than GGX "
-        "with the exact Smith term: see [the masking terms](#two-masking-terms).",
+        "with the exact Smith term: see [Two masking terms](#two-masking-terms).",
         "White dielectric": "The diffuse and specular lobes are added without reducing the diffuse lobe. "
-        "`DIFFUSE_BURLEY` also gains light at high roughness.",
+        "`DIFFUSE_BURLEY` also gains energy at high roughness.",
         "White metal, anisotropy 0.7": "The loss is that of single-scattering GGX with the exact Smith term.",
-        "White dielectric, coat of this roughness": "The base has roughness 0.5; see [the "
-        "coat](#the-clear-coat-is-added).",
+        "White dielectric, coat of this roughness": "The base has roughness 0.5; see "
+        "[below](#the-clear-coat-does-not-attenuate-the-base).",
     },
     trials=trials,
     sections=sections,

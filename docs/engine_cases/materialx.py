@@ -1,4 +1,4 @@
-"""MaterialX: furnaces of its generated GLSL, its fit of E, and causes."""
+"""MaterialX: white furnaces of its generated GLSL, its fit of E, and causes."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from .base import Engine, Furnace, furnace, material, single_scattering
 
 PLACES = ((0.25, 1.0), (0.5, 1.0), (0.5, 0.25), (0.75, 0.5), (1.0, 1.0), (1.0, 0.5), (1.0, 0.05))
 
-INTRO = """This card tests the GLSL that `GlslShaderGenerator` writes for `open_pbr_surface` and `standard_surface`, lit
-by one directional light. Inputs have their default values except for color 1, roughness 0.5 and the inputs that the
-heading of a table names. Environments, transmission and subsurface scattering are not tested.
-`DIRECTIONAL_ALBEDO_METHOD` is 0, the generator's default, so that albedos are computed from fits."""
+INTRO = """This card covers the GLSL code that `GlslShaderGenerator` writes for `open_pbr_surface` and
+`standard_surface`, under one directional light. The base color is 1 and the specular roughness is 0.5 unless a table
+varies it; inputs that are not named in the heading of a table have their default values. Environment maps, transmission
+and subsurface scattering are not tested. `DIRECTIONAL_ALBEDO_METHOD` is 0, the generator's default: the shaders compute
+directional albedos from analytic fits."""
 
 
 def trials(folder: Path) -> dict[str, float]:
-    """White metal of open_pbr_surface, E of its lobe, and the fit of E that the quotient of both is."""
+    """Albedo of white metal in open_pbr_surface, exact E of its lobe, and fitted E, the quotient of the two."""
     figures = {}
     for rough, cosine in PLACES:
         key = f"{rough:g}_{cosine:g}"
@@ -26,7 +27,7 @@ def trials(folder: Path) -> dict[str, float]:
 
 
 def sections(figures: dict[str, dict[str, float]]) -> str:
-    """The fit against the integral."""
+    """The comparison of the fit with the exact integral."""
     last = list(figures.values())[-1]
     rows = "\n".join(
         f"| {rough:g} | {cosine:g} | "
@@ -36,25 +37,27 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
     )
     return f"""## The fit behind the energy compensation
 
-`mx_ggx_energy_compensation` multiplies the lobe by 1 + F (1 - E) / E, with E from `mx_ggx_dir_albedo_analytic`, a
-rational function. The albedo of white metal is E of the integral divided by E of the fit:
+`mx_ggx_energy_compensation` multiplies the lobe by 1 + F (1 - E) / E, where E is the directional albedo of the lobe at
+F = 1. E is approximated by a rational function, `mx_ggx_dir_albedo_analytic`. The albedo of white metal is therefore
+the exact E divided by the fitted E:
 
-| roughness | n.v | E (integral) | E of the fit | white metal |
+| roughness | n.v | exact E | fitted E | albedo of white metal |
 |---|---|---|---|---|
 {rows}
 
-E of the fit is computed from the other two columns."""
+The fitted E is not evaluated directly: it is the exact E divided by the albedo of white metal."""
 
 
 _LAYERS = (
-    "`mx_layer_bsdf` weights the base by 1 - E(n.v) of the layer, and `mx_ggx_energy_compensation` evaluates E at "
-    "n.v: both depend only on the view direction. This keeps the albedo in white furnaces close to 1 and is deliberate "
-    "in a rasterizer."
+    "`mx_layer_bsdf` weights the base by 1 - E(n.v), where E is the albedo of the layer above it, and "
+    "`mx_ggx_energy_compensation` evaluates E at n.v. Both factors depend only on the view direction. This deliberate "
+    "choice keeps the albedo in white furnaces close to 1, and a rasterizer does not need reciprocity."
 )
 _GLOSS = (
-    "`mx_dielectric_bsdf` reflects light by the exact Fresnel term, but reduces its base by the fit of E for Schlick's "
-    "approximation, `mx_ggx_dir_albedo(n.v, alpha, F0, 1)`: see the white-furnace results for the white dielectric. "
-    "Remedy: a fit of E for the exact term."
+    "The specular lobe of `mx_dielectric_bsdf` uses the exact Fresnel equations, but its base is attenuated by a "
+    "directional albedo that was fitted for Schlick's approximation, `mx_ggx_dir_albedo(n.v, alpha, F0, 1)`: see the "
+    "white-furnace results for the white dielectric. Remedy: fit the directional albedo for the exact Fresnel "
+    "equations."
 )
 CAUSES = {
     ("open-pbr-surface", "reciprocity"): _LAYERS,
@@ -89,10 +92,10 @@ ENGINE = Engine(
         Furnace("White dielectric, Standard Surface", "standard-surface", lambda r: {"rough": r}),
     ),
     remarks={
-        "White metal, OpenPBR": "The deviations are those of [the fit](#the-fit-behind-the-energy-compensation), which "
-        "are largest for narrow lobes at grazing angles.",
-        "White metal, Standard Surface": "`mx_artistic_ior` clamps the reflectivity to 0.99, so that white metal loses "
-        "about 1 % more light than that of OpenPBR.",
+        "White metal, OpenPBR": "The deviations from 1 are errors of [the "
+        "fit](#the-fit-behind-the-energy-compensation). They are largest for narrow lobes at grazing angles.",
+        "White metal, Standard Surface": "`mx_artistic_ior` clamps the reflectivity to 0.99. White metal therefore "
+        "reflects about 1 % less light than in OpenPBR.",
     },
     trials=trials,
     sections=sections,

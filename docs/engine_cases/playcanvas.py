@@ -1,4 +1,4 @@
-"""PlayCanvas: furnaces, the width in its masking term, the scale of gloss beside the diffuse lobe, and causes."""
+"""PlayCanvas: white furnaces, the alpha in its masking term, the scale of its specular lobe, and causes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ import numpy as np
 
 from .base import Engine, Furnace, furnace, material, single_scattering
 
-INTRO = """This card tests the lit material with the metalness workflow under one directional light: the chunks
+INTRO = """This card covers the lit material with the metalness workflow under one directional light: the chunks
 `getLightDiffuse`, `getLightSpecular`, `getFresnel`, `getSpecularModulate` and `combineColor`, called in the order of
-`litForwardBackend` and `lightFunctionLight`, without environment, area lights, clear coat or iridescence. In the
-furnaces of metal, a light of intensity 1 has irradiance 1. For materials with a diffuse lobe, the intensity is 1 / pi,
-so that a white diffuse surface returns 1: see [the scale of both lobes](#gloss-beside-the-diffuse-lobe)."""
-PAPER = 1.0 / np.pi  # intensity of a light at which the diffuse lobe reflects its irradiance
+`litForwardBackend` and `lightFunctionLight`. Environment maps, area lights, clear coat and iridescence are not tested.
+In the white furnaces of metals, a light of intensity 1 has irradiance 1. For materials with a diffuse lobe, the
+intensity is 1 / pi, which gives a white diffuse surface an albedo of 1: see
+[The scale of the specular lobe](#the-scale-of-the-specular-lobe)."""
+PAPER = 1.0 / np.pi  # light intensity at which the albedo of a white diffuse surface is 1
 
 
 def trials(folder: Path) -> dict[str, float]:
-    """How well G with either width describes the lobe, and single lobes at full intensity."""
+    """Errors of the lobe's formula with alpha^2 and alpha^4 in G; albedos of single lobes at full intensity."""
     rough = 0.7
     lobe = material(folder, "playcanvas-standard", rough=rough)
     random = np.random.default_rng(1)
@@ -40,7 +41,7 @@ def trials(folder: Path) -> dict[str, float]:
 
 
 def _metal(wo: np.ndarray, wi: np.ndarray, a2: float, masking: float) -> np.ndarray:
-    """D V |cos theta_i| of GGX with one squared width in D and another in V."""
+    """D V |cos theta_i| of GGX with alpha^2 = `a2` in D and `masking` in V."""
     half = wo + wi
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     density = a2 / (np.pi * (half[:, 2] ** 2 * (a2 - 1.0) + 1.0) ** 2)
@@ -50,37 +51,37 @@ def _metal(wo: np.ndarray, wi: np.ndarray, a2: float, masking: float) -> np.ndar
 
 
 def sections(figures: dict[str, dict[str, float]]) -> str:
-    """The width of G, and the scale of gloss."""
+    """The sections on the alpha in G and the scale of the specular lobe."""
     last = list(figures.values())[-1]
-    return f"""## The width in G is squared twice
+    return f"""## Alpha is squared twice in G
 
 `calcLightSpecular` in `lightSpecularGGX` sets `roughness` to (1 - gloss)^2, which is the alpha of GGX, and `alpha` to
-its square. D is correct: it uses `alpha` as alpha^2. G uses `alpha2 = alpha * alpha`, that is, alpha^4, so that the
-masking is that of a smoother surface, of width alpha^2. With alpha^4, the formula D V cos gives the shader's values
-within {last["own_off"]:.0e} for 2,000 random pairs at gloss 0.3, in which all cosines are 0.05 or more; with alpha^2,
-as in Heitz2014, they differ by up to {last["meant_off"]:.0%}, and the shader is {last["meant_mean"] - 1.0:.0%} brighter
-on average. White metal of gloss 0.3 returns {last["grazing"]:.2f} at n.v 0.05 and {last["normal"]:.2f} at n.v 1; with
-alpha^2 in G, it would return {last["meant_grazing"]:.2f} and {last["meant_normal"]:.2f}.
+its square. D is correct: it uses `alpha` as alpha^2. G uses `alpha2 = alpha * alpha`, that is, alpha^4, which is the
+masking of a smoother surface. The formula D V cos, with alpha^4 in V, reproduces the shader's values within
+{last["own_off"]:.0e} for 2,000 random pairs of directions at gloss 0.3, with all cosines 0.05 or more. With alpha^2, as
+in Heitz2014, the two differ by up to {last["meant_off"]:.0%}, and the shader is {last["meant_mean"] - 1.0:.0%} brighter
+on average. At gloss 0.3, the albedo of white metal is {last["grazing"]:.2f} at n.v 0.05 and {last["normal"]:.2f} at
+n.v 1; with alpha^2 in G, it would be {last["meant_grazing"]:.2f} and {last["meant_normal"]:.2f}.
 Remedy: use `alpha` instead of `alpha2` in the two square roots. The WGSL chunk of the same name has the same lines;
-`lightSpecularAnisoGGX` uses its widths correctly.
+`lightSpecularAnisoGGX` uses its two alphas correctly.
 
-## Gloss beside the diffuse lobe
+## The scale of the specular lobe
 
-`getLightDiffuse` is the cosine without the factor 1 / pi, whereas D contains 1 / pi. Under one light of intensity 1, a
-white dielectric returns {last["paper"]:.3f} and white metal about 1. Relative to the diffuse lobe, the specular lobe
-is therefore weaker than in glTF's reference by a factor of pi. If this is a choice of units, both lobes need the same
-units."""
+`getLightDiffuse` returns the cosine without the factor 1 / pi, whereas D contains 1 / pi. Under one light of intensity
+1, the albedo of a white dielectric is {last["paper"]:.3f}, and that of white metal is about 1. Relative to the diffuse
+lobe, the specular lobe is therefore weaker than in glTF's reference by a factor of pi. If the factor is a choice of
+units, it must be the same for both lobes."""
 
 
 CAUSES = {
-    ("playcanvas-standard", "energy"): "G is that of a smoother surface: see "
-    "[above](#the-width-in-g-is-squared-twice).",
-    ("playcanvas-sheen", "energy"): "`combineColor` scales the base by 1 - 0.157 times the color of the sheen at "
-    "all angles, whereas the lobe D V of white sheen alone reflects {sheen_25:.2f} at width 0.25 and n.v 0.05 "
-    "({sheen_100:.2f} at width 1). In addition, the base gains light as above.",
-    ("playcanvas-sheen", "precision"): "`NoH2 * (alpha - 1.0) + 1.0` in the lobe of the base is the difference of two "
-    "numbers close to 1 at the center of a narrow lobe; at gloss 1, `alpha` is 1e-6. Remedy: compute 1 - NoH^2 as the "
-    "squared length of cross(n, h), as in Filament.",
+    ("playcanvas-standard", "energy"): "G is that of a smoother surface: see [above](#alpha-is-squared-twice-in-g).",
+    ("playcanvas-sheen", "energy"): "At all angles, `combineColor` scales the base by 1 - 0.157 times the color of the "
+    "sheen, whereas the lobe D V of white sheen alone has an albedo of {sheen_25:.2f} at sheen roughness 0.25 and n.v "
+    "0.05 ({sheen_100:.2f} at sheen roughness 1). In addition, the base gains energy because of its masking term (see "
+    "[above](#alpha-is-squared-twice-in-g)).",
+    ("playcanvas-sheen", "precision"): "At the center of a narrow lobe, `NoH2 * (alpha - 1.0) + 1.0` in the lobe of "
+    "the base loses digits to cancellation; at gloss 1, `alpha` is 1e-6. Remedy: compute 1 - NoH^2 as the squared "
+    "length of cross(n, h), as in Filament.",
 }
 
 ENGINE = Engine(
@@ -107,9 +108,9 @@ ENGINE = Engine(
         ),
     ),
     remarks={
-        "White metal": "G is that of a smoother surface: see [below](#the-width-in-g-is-squared-twice). At roughness "
-        "1, both widths are the same, and the loss is that of single scattering.",
-        "White dielectric, lamp of 1 / pi": "Without area lights, the diffuse lobe is not reduced by F, and the "
+        "White metal": "G is that of a smoother surface: see [below](#alpha-is-squared-twice-in-g). At roughness 1, "
+        "alpha^2 and alpha^4 are equal, and the loss is that of single scattering.",
+        "White dielectric, lamp of 1 / pi": "Without area lights, the diffuse lobe is not multiplied by 1 - F, and the "
         "specular lobe is added to it.",
     },
     trials=trials,

@@ -1,4 +1,4 @@
-"""three.js: furnaces, trials with other tables, and causes."""
+"""three.js: white furnaces, trials with other tables, and causes."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from gonio.catalog.shaders import files
 from . import three_builds
 from .base import Engine, Furnace, asymmetry, furnace, material, single_scattering
 
-INTRO = """This card tests MeshStandardMaterial and MeshPhysicalMaterial of WebGLRenderer under directional lights. It
-runs the package's own fragment program, `ShaderLib/meshphysical.glsl.js`, for a flat surface without texture maps, with
-the defines that WebGLRenderer sets. The two releases tested are the last one before and the newest one after
-[#33983](https://github.com/mrdoob/three.js/pull/33983), which replaced the compensation of rough metals. Light from an
-environment map follows a different code path (`RE_IndirectSpecular_Physical`) and is not tested here. The materials
-three-tsl-... are those of WebGPURenderer, MeshStandardNodeMaterial and MeshPhysicalNodeMaterial. They run the WGSL that
-the package's TSL build passes to the device; the two builds are [compared below](#tsl-against-webgl)."""
+INTRO = """This card covers MeshStandardMaterial and MeshPhysicalMaterial of WebGLRenderer under directional lights. The
+tests run the package's own fragment program, `ShaderLib/meshphysical.glsl.js`, for a flat surface without texture maps,
+with the defines that WebGLRenderer sets. The two releases are the last one before
+[#33983](https://github.com/mrdoob/three.js/pull/33983), which replaced the energy compensation of rough metals, and the
+newest one after it; in the tables, an arrow separates their values. Light from an environment map follows a different
+code path (`RE_IndirectSpecular_Physical`) and is not tested here. The materials named three-tsl-... are
+MeshStandardNodeMaterial and MeshPhysicalNodeMaterial of WebGPURenderer. For these, the tests run the WGSL code that the
+package's TSL build passes to WebGPU; the two builds are [compared below](#tsl-against-webgl)."""
 
 THREAD = {(0.5, 0.5): (0.90, 1.00), (0.75, 0.5): (0.84, 1.00), (1.0, 0.5): (0.72, 0.94), (1.0, 1.0): (0.58, 0.89)}
 
 
 def _tables() -> dict[str, np.ndarray]:
-    """Tables in place of the package's: of its size but computed here, finer ones, and 16 x 16 from edge to edge."""
+    """Tables that replace the package's: recomputed ones of equal and higher resolution, one with texels at 0, 1."""
     tables = {}
     for size in (16, 64, 256):
         dfg = np.asarray(go.bake("ggx", lut=["dfg"], resolution=size).arrays["dfg"])
@@ -42,7 +43,7 @@ def _tables() -> dict[str, np.ndarray]:
 
 
 def trials(folder: Path) -> dict[str, float]:
-    """The thread's figures, the table's last texel, and white metal with other tables in place of the package's."""
+    """Values reported in the thread, the last texel of the table, and white metal with other tables."""
     own = np.load(folder / "dfgLUT.npy")
     figures = {
         f"thread_{roughness:g}_{cosine:g}": furnace(material(folder, "three-standard", rough=roughness), (cosine,))[0]
@@ -70,7 +71,7 @@ def trials(folder: Path) -> dict[str, float]:
 
 
 def _layers(folder: Path) -> dict[str, float]:
-    """Albedos of single lobes at grazing angles, seen through the base that they leave."""
+    """Albedos of single lobes at grazing angles, and the fraction by which sheen attenuates the base."""
     bare = furnace(material(folder, "three-physical", rough=0.5), (0.05,))[0]
     figures = {}
     for width in (0.1, 0.25):
@@ -86,7 +87,7 @@ def _layers(folder: Path) -> dict[str, float]:
 
 
 def _cancellation(alpha: float) -> float:
-    """Largest relative error of D of GGX by the cosine of the half vector, in float32, for the same cosine."""
+    """Largest relative error of GGX's D in float32, as a function of the exact cosine of the half vector."""
     cosine = np.cos(np.linspace(0.0, 4.0 * alpha, 2000)).astype(np.float32)
     a2 = np.float32(alpha * alpha)
     rounded = a2 / (np.pi * (cosine * cosine * (a2 - np.float32(1)) + np.float32(1)) ** 2)
@@ -96,7 +97,7 @@ def _cancellation(alpha: float) -> float:
 
 
 def sections(figures: dict[str, dict[str, float]]) -> str:
-    """The thread's figures, and the trials of the table; by version."""
+    """Sections on the values in the thread, the table of E and the TSL build, from values keyed by version."""
     (old, before), (new, after) = figures.items()
     rows = [
         f"| {roughness:g} | {cosine:g} | {stated[0]:.2f} | {before[f'thread_{roughness:g}_{cosine:g}']:.3f} | "
@@ -111,36 +112,38 @@ def sections(figures: dict[str, dict[str, float]]) -> str:
             ("16 x 16, recomputed at the same texel centers", "centers_16"),
             ("64 x 64", "centers_64"),
             ("256 x 256", "centers_256"),
-            ("16 x 16, first and last texel at 0 and 1", "edges_16"),
+            ("16 x 16, first and last texels at 0 and 1", "edges_16"),
         )
     )
     return f"""## The values reported in #33983
 
-| roughness | n.v | thread: before | {old} | thread: after | {new} |
+| roughness | n.v | before, as reported | {old}, measured | after, as reported | {new}, measured |
 |---|---|---|---|---|---|
 {listed}
 
-The values reported in the thread are confirmed in all four rows, both by Gonio's reading of the shader and by
-WebGLRenderer itself ([below](#reproducing-these-results)). Before the change, `BRDF_GGX_Multiscatter` added a lobe
-scaled by the product of the losses of both directions. For roughness 1 at normal incidence, single scattering returns
-{before["none"]:.3f}, and the added lobe raises this to {before["own"]:.3f}, which recovers
-{(before["own"] - before["none"]) / (1 - before["none"]):.0%} of the loss. Equation 16 of Turquin, used in {new},
-divides by the energy of single scattering, so that only the errors of the table remain.
+The table gives the albedo of white metal before and after the change. Gonio's evaluation of the shader confirms the
+values reported in the thread in all four rows, and so does WebGLRenderer itself
+([below](#reproducing-these-results)). Before the change, `BRDF_GGX_Multiscatter` added a lobe scaled by the product of
+the energy losses 1 - E in both directions. At roughness 1 and normal incidence, the albedo of single scattering is
+{before["none"]:.3f}; the added lobe raises it to {before["own"]:.3f} and thus recovers
+{(before["own"] - before["none"]) / (1 - before["none"]):.0%} of the loss. Turquin's equation 16, used in {new},
+divides by the albedo of single scattering; only the errors of the table remain.
 
-## The table clamps at its border texels
+## The table of E is clamped at its border texels
 
 `DFGLUTData.js` contains 16 x 16 texels, each computed at its center. `texture2D(dfgLUT, vec2(roughness,
-dotNV))` returns the last texel for every coordinate above 31/32. For roughness 1 at normal incidence, it returns
-E = {after["texel"]:.4f}, which is correct for the center of the texel ({after["exact_texel"]:.4f}), whereas the energy
-for roughness 1 at normal incidence is {after["exact_end"]:.4f}. The quotient,
-{after["exact_end"] / after["texel"]:.3f}, is the albedo of white metal. The same happens below 1/32 toward grazing
-angles, with the opposite sign. With other tables in the same program, the albedo of white metal is:
+dotNV))` returns the last texel for every coordinate above 31/32. At roughness 1 and normal incidence, this texel gives
+E = {after["texel"]:.4f}. The value is correct at the center of the texel ({after["exact_texel"]:.4f}), but the exact E
+at roughness 1 and normal incidence is {after["exact_end"]:.4f}. The quotient,
+{after["exact_end"] / after["texel"]:.3f}, is the albedo of white metal. At grazing angles, where n.v is below 1/32, the
+lookup is clamped in the same way, and the error has the opposite sign. The following table gives the albedo of white
+metal if the same program uses other tables:
 
 | table | roughness 1, n.v 1 | roughness 0.5, n.v 0.02 |
 |---|---|---|
 {tables}
 
-Remedy at the same size: compute the texels at 0, 1/15, ... 1, scale the coordinates by 15/16 and add 1/32, as
+Remedy without a larger table: compute the texels at 0, 1/15, ..., 1, scale the coordinates by 15/16 and add 1/32, as
 `LTC_Uv` in the same chunk does for its tables.
 
 {three_builds.section(old, before, new, after)}"""
@@ -149,57 +152,57 @@ Remedy at the same size: compute the texels at 0, 1/15, ... 1, scale the coordin
 CAUSES = {
     ("three-standard", "reciprocity"): "`multiScatteringCompensation` in `lights_fragment_begin` depends only on n.v, "
     "as in Turquin's equation 16, which trades reciprocity for energy conservation. Without it (E = 1 in the table), "
-    "f(wo, wi) and f(wi, wo) differ by {none_asymmetry:.0e} instead of {asymmetry:.2f}. This matters for path tracers, "
-    "not for a rasterizer.",
-    ("three-standard", "energy"): "The table's first texel is used for every n.v below 1/32: white metal of roughness "
-    "0.5 returns {own_grazing:.3f} at n.v 0.02, compared with {centers_256_grazing:.3f} for a table of 256 x 256 "
-    "texels.",
-    ("three-standard", "energy", "0.185.1"): "With the 16 x 16 table, the added lobe is {own_grazing:.3f} - "
-    "{none_grazing:.3f} at roughness 0.5 and n.v 0.02; the sum exceeds 1 only beyond 89 degrees. The loss at all other "
-    "angles is due to the term itself (see above).",
-    ("three-standard", "precision"): "`D_GGX` computes `dotNH^2 (a2 - 1) + 1`, which is the difference of two "
-    "numbers close to 1 near the center of the lobe: at roughness 0.045, this formula alone has errors of up to "
-    "{cancellation:.1%} in float32, even if dotNH is exact. Remedy: compute 1 - dotNH^2 as the squared length of "
-    "cross(n, h), as in Filament.",
-    ("three-standard(metal=0)", "energy"): "A specular lobe is added over a white base; see the white-furnace results "
-    "for the white dielectric.",
-    ("three-standard(metal=0)", "reciprocity"): "Same as for metal; the factor is 1 + 0.04 (1 / E - 1).",
-    ("three-standard(metal=0)", "precision"): "Same as for metal.",
-    ("three-standard(metal=0)", "linearity", "0.185.1"): "Same as for metal.",
+    "the largest relative difference between f(wo, wi) and f(wi, wo) is {none_asymmetry:.0e} instead of "
+    "{asymmetry:.2f}. Reciprocity matters to path tracers but not to rasterizers.",
+    ("three-standard", "energy"): "The table's first texel is used for every n.v below 1/32: the albedo of white metal "
+    "of roughness 0.5 is {own_grazing:.3f} at n.v 0.02, compared with {centers_256_grazing:.3f} for a table of 256 x "
+    "256 texels.",
+    ("three-standard", "energy", "0.185.1"): "At roughness 0.5 and n.v 0.02, the compensation lobe raises the albedo "
+    "from {none_grazing:.3f} to {own_grazing:.3f} with the 16 x 16 table; the albedo exceeds 1 only beyond 89 degrees. "
+    "The loss at all other angles is due to the compensation term itself (see [above](#the-values-reported-in-33983)).",
+    ("three-standard", "precision"): "Near the center of the lobe, `dotNH^2 (a2 - 1) + 1` in `D_GGX` loses digits to "
+    "cancellation: at roughness 0.045, D has errors of up to {cancellation:.1%} in float32 even if dotNH is exact. "
+    "Remedy: compute 1 - dotNH^2 as the squared length of cross(n, h), as in Filament.",
+    ("three-standard(metal=0)", "energy"): "The specular lobe is added to a white base that is attenuated too little; "
+    "see the white-furnace results for the white dielectric.",
+    ("three-standard(metal=0)", "reciprocity"): "same as for metal; the compensation factor is 1 + 0.04 (1 / E - 1).",
+    ("three-standard(metal=0)", "precision"): "same as for metal.",
+    ("three-standard(metal=0)", "linearity", "0.185.1"): "same as for metal.",
     (
         "three-standard(metal=0)",
         "linearity",
-    ): "Between metal and dielectric, the blended F0 is multiplied by 1 + F0 (1 / E - 1), "
-    "so that the color enters squared while its share in the diffuse lobe decreases. An error of this size is "
-    "invisible.",
-    ("three-standard", "linearity"): "`BRDF_GGX_Multiscatter` multiplies FssEss of both directions by Favg, so that "
-    "the color enters only as its third power. An error of this size is invisible.",
-    ("three-physical", "reciprocity"): "Same as for the standard material; with a clear coat, the base is also scaled "
-    "by 1 - clearcoat F(n.v) at the end of `meshphysical`, which depends only on the view direction.",
-    ("three-physical", "energy"): "Sheen and a specular lobe are added over a white base. `IBLSheenBRDF` is the sheen "
-    "albedo from which `RE_Direct_Physical` computes the reduction of the base: at sheen roughness 0.25 and n.v 0.05, "
-    "the base is reduced by {sheen_taken_25:.2f}, whereas the lobe D_Charlie V_Neubelt reflects {sheen_25:.2f}; at "
-    "sheen roughness 0.1, the values are {sheen_taken_10:.2f} and {sheen_10:.2f}, so that the sheen lobe alone gains "
-    "light. For the specular lobe, see the white-furnace results for the white dielectric.",
-    ("three-anisotropic", "reciprocity"): "Same as for the standard material.",
+    ): "If a material is partly metallic, its blended F0 is multiplied by 1 + F0 (1 / E - 1). The color therefore "
+    "enters squared, while its share in the diffuse lobe decreases. An error of this size is invisible.",
+    ("three-standard", "linearity"): "`BRDF_GGX_Multiscatter` multiplies FssEss of both directions by Favg. This "
+    "product depends on the third power of the color. An error of this size is invisible.",
+    ("three-physical", "reciprocity"): "same as for the standard material; with a clear coat, the end of "
+    "`meshphysical` also scales the base by 1 - clearcoat F(n.v), which depends only on the view direction.",
+    ("three-physical", "energy"): "The sheen and specular lobes are added to a white base that is attenuated too "
+    "little. `RE_Direct_Physical` computes the attenuation due to sheen from `IBLSheenBRDF`, a fit of the sheen "
+    "albedo: at sheen roughness 0.25 and n.v 0.05, the base is reduced by a fraction of {sheen_taken_25:.2f}, whereas "
+    "the lobe D_Charlie V_Neubelt has an albedo of {sheen_25:.2f}. At sheen roughness 0.1, the values are "
+    "{sheen_taken_10:.2f} and {sheen_10:.2f}: the sheen lobe alone gains energy. For the specular lobe, see the "
+    "white-furnace results for the white dielectric.",
+    ("three-anisotropic", "reciprocity"): "same as for the standard material.",
     (
         "three-anisotropic",
         "energy",
-    ): "Same as for the standard material. The loss of up to a fifth at high anisotropy is not "
-    "a violation: E is looked up at `roughness`, which is the smaller of the two widths (`alphaT` is larger).",
-    ("three-iridescent", "positivity"): "`Fresnel0ToIor` takes the square root of a base reflectance "
-    "of 0, and the phase of the film involves a square root at grazing incidence. No value is wrong.",
-    ("three-iridescent", "reciprocity"): "Same as for the standard material; in addition, `evalIridescence` is called "
-    "with n.v instead of v.h, once for all lights, in 0.185.1 as well.",
-    ("three-iridescent", "energy"): "Same as for the standard material.",
-    ("three-iridescent", "linearity"): "This is inherent in the model: the reflectance of a film is not linear in "
-    "that of its base.",
-    ("three-iridescent", "precision"): "Same as for the standard material.",
+    ): "same as for the standard material. At high anisotropy, up to a fifth of the light is lost, because E is looked "
+    "up at `roughness`, the smaller of the two widths (`alphaT` is larger); a loss does not violate the law.",
+    ("three-iridescent", "positivity"): "`Fresnel0ToIor` takes the square root of the base reflectance, which is 0 "
+    "here, and the phase of the film contains a square root that is 0 at grazing incidence. The values are correct; "
+    "only their derivatives are not finite.",
+    ("three-iridescent", "reciprocity"): "Both releases call `evalIridescence` once for all lights, with n.v instead "
+    "of v.h; in 0.187.0, the cause given for the standard material applies as well.",
+    ("three-iridescent", "energy"): "same as for the standard material.",
+    ("three-iridescent", "linearity"): "The nonlinearity is inherent in the model: the reflectance of a thin film is "
+    "not linear in that of its base.",
+    ("three-iridescent", "precision"): "same as for the standard material.",
 }
 
 TSL = ("three-tsl-standard", "three-tsl-physical", "three-tsl-anisotropic", "three-tsl-iridescent")
 CAUSES |= {
-    (name, law): f"Same as for `{name.replace('-tsl', '')}`."
+    (name, law): f"same as for `{name.replace('-tsl', '')}`."
     for name in TSL
     for law in ("positivity", "reciprocity", "energy", "linearity", "precision")
 } | {
@@ -207,7 +210,7 @@ CAUSES |= {
         "three-tsl-physical",
         "energy",
         "0.185.1",
-    ): "Same as for `three-physical`; in addition, `V_Neubelt` is not limited to 1: see [above](#tsl-against-webgl).",
+    ): "same as for `three-physical`; in addition, `V_Neubelt` is not limited to 1: see [above](#tsl-against-webgl).",
 }
 
 ENGINE = Engine(
@@ -254,18 +257,17 @@ ENGINE = Engine(
     ),
     remarks={
         "White dielectric": "`RE_Direct_Physical` scales the diffuse lobe by 1 - F(v.h) for each light. At grazing "
-        "view angles, v.h is large and F small for most light directions, although the specular lobe reflects far more "
-        "than this F suggests: at roughness 0.1 and n.v 0.05, the specular lobe alone returns {gloss:.2f}, and the "
-        "diffuse lobe still returns {gloss_diffuse:.2f}. `RE_IndirectDiffuse_Physical` in the same chunk instead uses "
-        "1 minus the albedo of the specular lobe. Release 0.185.1 does not reduce the diffuse lobe of direct light at "
-        "all.",
+        "view angles, v.h is large and F(v.h) is small for most light directions, although the albedo of the specular "
+        "lobe is much larger than these values of F: at roughness 0.1 and n.v 0.05, it is {gloss:.2f}, and that of the "
+        "diffuse lobe is still {gloss_diffuse:.2f}. In the same chunk, `RE_IndirectDiffuse_Physical` uses 1 minus the "
+        "albedo of the specular lobe instead. Release 0.185.1 does not reduce the diffuse lobe of direct light at all.",
         "White, half metal": "The F0 of the dielectric and that of the metal are blended before the compensation "
         "factor, 1 + F0 (1 / E - 1), is applied, although this factor is meant for a single F0; "
-        "`RE_IndirectSpecular_Physical` compensates metal and dielectric separately and then blends them.",
+        "`RE_IndirectSpecular_Physical` compensates the metal and the dielectric separately before it blends them.",
         "White metal, anisotropy 0.7": "The engine looks up E in its albedo table at `roughness`, whereas the lobe is "
         "wider along the tangent.",
-        "White dielectric, clear coat of this roughness": "The base is scaled by 1 - F(n.v) of a smooth coat, whereas "
-        "a rough coat reflects less light than that at grazing angles.",
+        "White dielectric, clear coat of this roughness": "The base is scaled by 1 - F(n.v), the factor for a smooth "
+        "coat, although a rough coat reflects less light at grazing angles.",
         "White dielectric, coat and sheen": "The roughness in the table is that of the coat and the sheen; the "
         "base has roughness 0.5.",
         "White dielectric, coat and sheen, TSL": "The coat does not attenuate the sheen: see "

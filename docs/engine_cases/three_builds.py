@@ -1,4 +1,4 @@
-"""three.js: its TSL build against its GLSL, and why the values differ."""
+"""three.js: the TSL build compared with the GLSL, and the causes of the differences."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from gonio.catalog.shaders import files
 
 from .base import difference, material
 
-SAME = 1e-5  # the largest relative difference of equal formulas: three.js's constants have 32 bits
+SAME = 1e-5  # largest relative difference between equal formulas: three.js's constants are float32
 
 
 class Build(NamedTuple):
     """A comparison of the two builds.
 
-    name      of its figure; `title` of its row
-    material  without "three-", and its parameters
-    why       the values differ
-    changes   what makes the GLSL agree: (file, pattern, replacement)
+    name      key of its value; `title` is the first cell of its row
+    material  name without "three-"; `parameters` are the values of its parameters
+    why       cause of the difference
+    changes   changes to the GLSL after which both builds agree: (file, pattern, replacement)
     """
 
     name: str
@@ -41,7 +41,7 @@ BUILDS = (
         "standard",
         "standard",
         {},
-        "`BRDF_GGX_Multiscatter` divides by a term with `Favg` in GLSL, and with its square in TSL",
+        "the divisor in `BRDF_GGX_Multiscatter` contains `Favg` in GLSL, but its square in TSL",
         ((_LIGHTS, r"Favg(?= \+ EPS)", "Favg * Favg"),),
     ),
     Build("physical", "physical", "physical", {"index": 1.4}, "same as for the standard material"),
@@ -83,7 +83,7 @@ BUILDS = (
 
 
 def trials(folder: Path) -> dict[str, float]:
-    """The largest relative differences of the two builds, and what is left of them with the GLSL changed."""
+    """Largest relative differences between the two builds, and those that remain after the changes to the GLSL."""
     apart = {one.name: _difference(folder, one) for one in BUILDS}
     (package,) = (Path(one) for one in _includes(folder) if one.endswith("/shaders"))
     changed: dict[Path, str] = {}
@@ -116,7 +116,7 @@ def _difference(folder: Path, one: Build) -> float:
 
 
 def section(old: str, before: dict[str, float], new: str, after: dict[str, float]) -> str:
-    """The section on the two builds."""
+    """The section that compares the two builds."""
 
     def cell(value: float) -> str:
         return f"{value:.2g}" if value > SAME else "equal"
@@ -128,15 +128,17 @@ def section(old: str, before: dict[str, float], new: str, after: dict[str, float
     return f"""## TSL against WebGL
 
 The table gives the largest relative difference between the values of f in the two builds, over 4,000 pairs of
-directions up to 89 degrees, at base color 0.7, roughness 0.8 and metalness 0.3; *equal* means within 1e-5:
+directions up to 89 degrees. Base color is 0.7, roughness is 0.8 and metalness is 0.3; *equal* means a difference of at
+most 1e-5.
 
 | material | {old} | {new} | cause |
 |---|---|---|---|
 {rows}
 
-With these lines of the GLSL changed to match TSL, all values agree within {before["tsl_left"]:.0e} in {old} and
-{after["tsl_left"]:.0e} in {new}. In {new}, one difference remains.
+If these lines of the GLSL are changed to match TSL, all values agree within {before["tsl_left"]:.0e} in {old} and
+{after["tsl_left"]:.0e} in {new}. Release {new} itself still contains one of the differences, the order of sheen and
+clear coat.
 [KHR_materials_sheen](https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_materials_sheen) puts
 the clear coat on top of the sheen, as WebGLRenderer does. WebGPURenderer puts the sheen on top, where the coat does not
-attenuate it; the last two furnaces above differ most at grazing angles. Remedy: exchange the two blocks of
+attenuate it; the last two white furnaces above differ most at grazing angles. Remedy: exchange the two blocks of
 `PhysicalLightingModel.finish`."""

@@ -6,7 +6,7 @@
     sample = gold.sample(wo, u)          # .wi .weight .pdf .delta
 
 Names are loaded on first use; Dr.Jit and Mitsuba are loaded by the first computation. Importing Gonio selects a libLLVM
-for Dr.Jit; `import drjit` and `import mitsuba` may come before or after it.
+for Dr.Jit; `import drjit` and `import mitsuba` may precede or follow `import gonio`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from . import llvm, moved
 from ._version import __version__ as __version__
 from .errors import MachineError
 
-# Must run before Dr.Jit searches for a libLLVM. Without one the first CPU computation fails; a GPU needs none.
+# Must run before Dr.Jit searches for a libLLVM. Without LLVM, the first computation on the CPU fails; a GPU does not
+# need it.
 with contextlib.suppress(MachineError):
     llvm.use()
 

@@ -13,18 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-# A file that unpacks to more than this is treated as an attack on memory: 64 MiB plus 100 bytes per byte of the file.
+# A file that unpacks to more than this is treated as a decompression bomb: 64 MiB plus 100 bytes per byte of the file.
 # DEFLATE reaches a factor of 1000, but measured or rendered numbers shrink by a factor of 2 at most.
 MIN_LIMIT, MAX_EXPANSION = 1 << 26, 100
 MAX_ENTRIES = 1000
 
 
 class Unreadable(ValueError):
-    """A file is not an .npz archive, is damaged, or unpacks to an implausible size; the message says which."""
+    """Raised if a file is not an .npz archive, is damaged, or unpacks to an implausible size."""
 
 
 def read(path: Path, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
-    """All arrays in a file by name, or those of `names` that exist. Objects (pickles) are never loaded.
+    """The arrays in a file by name: all, or those of `names` that exist. Pickled objects are never loaded.
 
     Raises Unreadable if the file is not an .npz archive, is damaged or unpacks to an implausible size, and OSError if
     it cannot be opened.
@@ -43,7 +43,7 @@ def read(path: Path, names: Collection[str] | None = None) -> dict[str, np.ndarr
                 return {name: _array(archive, info) for name, info in wanted.items()}
         except Unreadable:
             raise
-        except Exception as error:  # zip, zlib and NumPy's header parser each raise their own types
+        except Exception as error:  # zipfile, zlib and NumPy's header parser raise exceptions of different types
             raise Unreadable(str(error) or type(error).__name__) from error
 
 
@@ -56,6 +56,6 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
             raise Unreadable(f"'{info.filename}' holds pickled objects, which are never loaded")
         if min(shape, default=1) < 0 or math.prod(shape) * dtype.itemsize != info.file_size - file.tell():
             raise Unreadable(f"'{info.filename}' claims the shape {shape}, which does not match its size")
-        # `read` returns the bytes that exist, whatever size the directory claims
+        # `read` returns the bytes that exist, regardless of the size in the directory
         values = np.frombuffer(bytearray(file.read(info.file_size)), dtype, math.prod(shape))
     return values.reshape(shape[::-1]).T if fortran else values.reshape(shape)

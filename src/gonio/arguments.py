@@ -82,7 +82,10 @@ def takes_fields(options: type | tuple[type, ...], keywords: type) -> Callable[[
 
 
 def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Let a function accept former names of its keywords, with a DeprecationWarning: `@renamed(former="present")`."""
+    """Let a function accept former names of its keyword arguments: `@renamed(former="present")`.
+
+    A former name causes a DeprecationWarning.
+    """
 
     def decorate(call: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(call)
@@ -102,7 +105,7 @@ def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def shown(value: object) -> str:
-    """A value as error messages show it: short, and printable in every encoding."""
+    """The `repr` of a value on one line, shortened for an error message."""
     text = " ".join(repr(value).split())
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
 
@@ -111,8 +114,8 @@ def shown(value: object) -> str:
 
 
 def integer(value: object) -> int:
-    """A Python or NumPy integer as `int`; booleans are rejected."""
-    import numpy as np  # imported here, as below, because `gonio --help` loads this file and does not need NumPy
+    """Convert a Python or NumPy integer to `int`; booleans are rejected."""
+    import numpy as np  # imported in functions because `gonio --help` loads this file but does not need NumPy
 
     if isinstance(value, bool | np.bool_):
         raise ValueError
@@ -123,7 +126,7 @@ def integer(value: object) -> int:
 
 
 def number(value: object) -> object:
-    """A scalar number; NaN and strings are rejected."""
+    """Return a scalar number unchanged; NaN and strings are rejected."""
     import numpy as np
 
     if isinstance(value, bool | np.bool_ | str | bytes) or np.ndim(value) != 0:  # type: ignore[arg-type]
@@ -203,7 +206,7 @@ _KINDS: dict[str, tuple[Check, str]] = {
 
 @functools.cache
 def _check_of(annotation: str) -> Check | None:
-    """The check of an annotation; None for an annotation that is not supported."""
+    """The check for an annotation; None if the annotation is not supported."""
     options = []
     for part in _alternatives(annotation):
         option = _one(part)

@@ -1,7 +1,7 @@
-"""Errors and warnings: each says what happened, where, and what to do about it.
+"""Errors and warnings. The message of an error states the problem, its location, and a remedy.
 
-Every error that a user can cause is a `GonioError`: the command line prints it in three lines and exits with `code`;
-Python programs catch one class.
+Every error that a user can cause is a `GonioError`, so a Python program needs to catch only one class. The command line
+prints the error in three lines and exits with `code`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class GonioError(Exception):
     """An error that the user can correct.
 
     what   the problem: the given value, and the expected one
-    where  its location: file and JSON pointer, option, or argument; may be empty
+    where  the location of the problem: a file and JSON pointer, an option, or an argument; may be empty
     hint   advice to the user
     """
 
@@ -47,17 +47,17 @@ class GonioError(Exception):
 
 
 class InputError(GonioError, ValueError):
-    """A scene, parameter, option or file cannot be used as given."""
+    """Raised if a scene, parameter, option or file cannot be used as given."""
 
 
 class MachineError(GonioError):
-    """This machine lacks a resource: no LLVM, no GPU, a full disk."""
+    """Raised if this machine lacks a resource, such as LLVM, a GPU or disk space."""
 
     code = 3
 
 
 class GonioWarning(UserWarning):
-    """Unusual but usable input; the message says what is assumed."""
+    """Issued for unusual but usable input; the message states what is assumed."""
 
 
 def did_you_mean(name: str, known: list[str] | tuple[str, ...]) -> str:
@@ -78,8 +78,10 @@ _IN_LOOP = "encountered an exception (see above)"  # Dr.Jit's text for any excep
 
 
 def user_line(error: BaseException) -> str:
-    """FILE:LINE of the innermost frame in user code that Gonio called (not in Gonio's or a library's code); "" if there
-    is none. The program that calls Gonio does not count as user code."""
+    """FILE:LINE of the innermost traceback frame in user code that Gonio called; "" if there is none.
+
+    Code of Gonio and of libraries, and the program that calls Gonio, do not count as user code.
+    """
     cause: BaseException | None = error
     visited: list[BaseException] = []
     while cause is not None and cause not in visited:
@@ -106,7 +108,7 @@ def summary(error: BaseException) -> str:
 
 
 def in_user_code(error: BaseException) -> InputError | None:
-    """An InputError for an exception raised in user code, with its line; None if no user code was called."""
+    """An InputError that states the line of user code that raised an exception; None if no user code was called."""
     line = user_line(error)
     return (
         InputError(summary(error), line, "correct it there: formulas use the functions of gonio.ops") if line else None
@@ -114,7 +116,7 @@ def in_user_code(error: BaseException) -> InputError | None:
 
 
 def out_of_loop(error: BaseException) -> BaseException:
-    """The original exception if Dr.Jit replaced it by a generic one while recording a loop; else the error itself."""
+    """The original exception if Dr.Jit replaced it with a generic one while recording a loop; else the error itself."""
     cause: BaseException | None = error
     while isinstance(cause, RuntimeError) and _IN_LOOP in str(cause):
         cause = cause.__cause__ or cause.__context__

@@ -19,7 +19,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def check_current_folder() -> None:
-    """Raise InputError if the current folder has been deleted, which makes C++ libraries end the process."""
+    """Raise InputError if the current folder has been deleted, because C++ libraries would then end the process."""
     try:
         os.getcwd()
     except OSError as error:
@@ -27,7 +27,10 @@ def check_current_folder() -> None:
 
 
 def check_file(path: str | Path) -> Path:
-    """The file that `path` names, with links followed. Raises InputError now if it could not be written later."""
+    """The file to be written, with symbolic links resolved. Raises InputError if it cannot be written there.
+
+    Called before a long computation, so that an unusable path is reported at once.
+    """
     target = Path(os.path.expanduser(path))
     try:
         if target.is_symlink():
@@ -55,7 +58,7 @@ def check_file(path: str | Path) -> Path:
 def changeable_by_others(path: Path) -> bool:
     """Whether a user other than this one and root may change a file or folder. False on systems without `getuid`.
 
-    For root, files owned by another user do not count: in a container they often belong to the same person outside.
+    If this user is root, files owned by another user are accepted: in a container, that owner is often the same person.
     """
     if not hasattr(os, "getuid"):
         return False
@@ -66,7 +69,7 @@ def changeable_by_others(path: Path) -> bool:
 
 
 def check_folder(folder: str | Path, parents: bool = False) -> Path:
-    """The folder, which exists or can be created. Raises InputError otherwise, before anything is computed.
+    """The path of a folder that exists or can be created. Raises InputError otherwise.
 
     parents  whether its parent folders may be missing too; `write_all` creates them
     """
@@ -78,7 +81,7 @@ def check_folder(folder: str | Path, parents: bool = False) -> Path:
         if os.path.exists(folder):
             raise InputError(f"'{folder}' is a file", str(folder), "choose another folder with -o")
         check_file(folder)
-        try:  # a folder reported as writable may still refuse
+        try:  # the system may report a folder as writable that is not
             folder.mkdir()
             folder.rmdir()
         except OSError as error:
@@ -97,7 +100,7 @@ def _reason(error: Exception) -> str:
 def with_ending(path: Path, ending: str, start: str = "") -> Path:
     """The path of a file in the same folder, with `start` before the name and `ending` after it.
 
-    A name longer than file systems allow is truncated and given a checksum of the whole name.
+    If the new name exceeds the limit of file systems, it is truncated, and a checksum of the whole name is added.
     """
     if not path.name:  # "." or "/"
         return path / (start + ending)
@@ -115,12 +118,12 @@ def write_whole(
 ) -> Path:
     """Write a file atomically: at any time, `path` is either the old file or the complete new one.
 
-    content  the bytes, or a function that writes to the path it is given, which has the same suffix
-    rescue   whether to write a file that cannot be written to a new folder beside it, in the current folder or among
-             the temporary files, so that hours of work are not lost
-    durable  whether to flush it to the disk first, so that not even a power cut leaves a partial file
+    content  the bytes, or a function that writes them to a temporary path, which it receives; the suffix is the same
+    rescue   whether to save the content elsewhere if `path` cannot be written: in a new folder beside it, in the
+             current folder or among the temporary files
+    durable  whether to flush the file to the disk first, so that even a power failure cannot leave a partial file
     Raises MachineError if the file cannot be written, InputError if the path cannot name a file. The error states where
-    the content was written instead; `path` is left unchanged.
+    the content was saved instead; `path` is left unchanged.
     """
 
     def fill(file: Path) -> None:
@@ -135,7 +138,7 @@ def write_whole(
         if not rescue:
             raise
         _rescue(error, Path(path), fill)
-    # In the same folder, hence on the same file system, where a rename is one step.
+    # The temporary file is in the same folder, hence on the same file system, where a rename is atomic.
     suffix = target.suffix if len(target.suffix) <= 16 else ""
     temporary = with_ending(target, f".{os.getpid()}.part{suffix}", ".")
     try:
@@ -163,15 +166,15 @@ def _failure(error: OSError, path: str | Path) -> MachineError:
 
 
 def _remove(file: Path) -> None:
-    with contextlib.suppress(OSError):  # its folder may be gone; an error here would hide the rescue's
+    with contextlib.suppress(OSError):  # its folder may be gone; an error here would hide that of the rescue
         file.unlink()
 
 
 def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], elsewhere: bool = False) -> NoReturn:
-    """Write the content elsewhere and raise the failure, with that place as its hint.
+    """Save the content elsewhere and raise the failure, with the new path as its hint.
 
-    fill       writes the file or folder at the path it is given
-    elsewhere  skip the target's folder, since its disk is full
+    fill       writes the file or folder to the path that it receives
+    elsewhere  whether to skip the target's folder, because its disk is full
     """
     place = keep_elsewhere(target, fill, elsewhere)
     hint = failure.hint if place is None else f"it is kept as {place}: move it from there"
@@ -179,10 +182,13 @@ def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], els
 
 
 def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool = False) -> Path | None:
-    """Let `fill` write a file or folder with the target's name in a new folder: beside the target, in the current
-    folder or among the temporary files. Returns its path, or None if all of these failed.
+    """Save a file or folder under the target's name in a new folder, and return its path.
 
-    elsewhere  skip the target's folder, since its disk is full
+    The new folder is created beside the target, in the current folder or among the temporary files. Returns None if
+    writing to all of these fails.
+
+    fill       writes the file or folder to the path that it receives
+    elsewhere  whether to skip the target's folder, because its disk is full
     """
     import tempfile  # its import takes 2 ms, and this is rarely needed
 
@@ -201,11 +207,13 @@ def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool
 
 
 def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files to a temporary folder, then move them: a new folder appears complete, an old one keeps other files.
+    """Write several files to a folder; a new folder appears only when it is complete.
+
+    The files are first written to a temporary folder and then moved. Other files in an existing folder are preserved.
+    Missing parent folders are created.
 
     files  content of each file by its name
-    Missing parent folders are created.
-    Raises MachineError if the folder cannot be written; the error states where its files are instead.
+    Raises MachineError if the folder cannot be written; the error states where the files were saved instead.
     """
 
     def fill(into: Path) -> None:

@@ -1,7 +1,7 @@
-"""Suspend garbage collection where it could crash or would only cost time.
+"""Suspend garbage collection where it could cause a crash or would only take time.
 
-Python may collect cycles at any allocation. If a cycle holds a scene, Mitsuba removes its objects from Dr.Jit's
-registry. While a kernel is being traced, or in another thread, this occasionally causes a segmentation fault.
+Python may collect reference cycles at any allocation. If a cycle contains a scene, Mitsuba removes its objects from
+Dr.Jit's registry. While a kernel is being traced, or in another thread, this occasionally causes a segmentation fault.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def pause() -> None:
 
 
 def resume() -> None:
-    """Undo one `pause`; the last one restores the former state."""
+    """Undo one call of `pause`; the last call restores the former state."""
     global _pauses
     with _lock:
         _pauses -= 1

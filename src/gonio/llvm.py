@@ -1,9 +1,9 @@
 """Select a libLLVM that Dr.Jit can use, before Dr.Jit searches for one.
 
-Dr.Jit does not ship LLVM. When imported, it loads the library named by DRJIT_LIBLLVM_PATH, or else the first it finds.
-With LLVM 14, 15 and 16, Mitsuba 3.9 aborts the process ("Cannot select fminimum"), and an abort cannot be caught.
-Therefore `import gonio` selects one that works. Versions are read from the files without loading them: every libLLVM
-contains its version as a symbol-version string such as `LLVM_19.1`.
+Dr.Jit does not ship LLVM. When imported, it loads the library named by DRJIT_LIBLLVM_PATH, or else the first one that
+it finds. With LLVM 14, 15 and 16, Mitsuba 3.9 aborts the process ("Cannot select fminimum"), and an abort cannot be
+caught. Therefore `import gonio` selects a version that works. Versions are read from the files without loading them:
+every libLLVM contains its version as a symbol-version string such as `LLVM_19.1`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .errors import GonioWarning, MachineError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-OLDEST_USABLE = 17  # 14, 15 and 16 measured to abort under Mitsuba 3.9; 19.1 and 23.1 measured to work
+OLDEST_USABLE = 17  # Mitsuba 3.9 aborted with 14, 15 and 16 in tests, and worked with 19.1 and 23.1
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 
 _SYMBOL = b"\0LLVM_"
@@ -53,10 +53,10 @@ class Library(NamedTuple):
 
 
 def read_version(path: Path) -> str:
-    """The version of the libLLVM at `path`, "" if it is not one; the file is read, not loaded."""
+    """The version of the libLLVM at `path`; "" if the file is not a libLLVM. The file is read but not loaded."""
     try:
         with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-            at = text.find(_SYMBOL)  # faster than a regular expression, and every start waits for it
+            at = text.find(_SYMBOL)  # faster than a regular expression; this runs at every start
             while at >= 0:
                 start = at + len(_SYMBOL)
                 version = text[start : text.find(b"\0", start)]
@@ -71,14 +71,14 @@ def read_version(path: Path) -> str:
 
 
 def _wheel() -> list[Path]:
-    """The libraries of installed wheels."""
+    """The libLLVM files in installed Python packages."""
     places = (("lib", "libLLVM*.so*"), ("lib", "libLLVM*.dylib"), ("bin", "LLVM-C*.dll"))
     prefixes = dict.fromkeys((sys.prefix, sys.base_prefix))
     return [path for prefix in prefixes for folder, name in places for path in sorted(Path(prefix, folder).glob(name))]
 
 
 def _system() -> list[Path]:
-    """The system's libraries."""
+    """The libLLVM files installed on the system."""
     from ctypes.util import find_library
 
     names = ("libLLVM*.so*", "libLLVM*.dylib")
@@ -96,7 +96,10 @@ def _ranked(paths: list[Path], source: str) -> list[Library]:
 
 
 def _in_order() -> Iterator[Library]:
-    """The environment's, then the wheel's, then the system's libraries; each source is searched only when needed."""
+    """Libraries in the order of preference: the environment's, those of installed packages, the system's.
+
+    Each source is searched only when it is needed.
+    """
     given = os.environ.get(VARIABLE)
     if given:
         yield from _ranked([Path(given)], "environment")
@@ -108,7 +111,7 @@ def libraries() -> list[Library]:
     """Every available libLLVM, one entry per file, in the order in which they are tried."""
     unique: dict[Path, Library] = {}
     for library in _in_order():
-        # `use` writes the wheel's path into the environment; its source is still the wheel
+        # `use` writes the path of a package's library into the environment; its source is still the package
         first = unique.setdefault(library.path, library)
         unique[library.path] = first._replace(source=library.source)
     return list(unique.values())
@@ -156,9 +159,9 @@ def _loaded() -> Library | None:
 def _exchange() -> bool:
     """Restart Dr.Jit with the libLLVM that the environment now names; returns whether it was restarted.
 
-    Dr.Jit is not restarted if kernels have run, a GPU holds values, or Mitsuba objects are alive: they would be lost.
-    Dr.Jit offers this to C++ only, under the mangled names that Linux and macOS give to `jit_shutdown(int)` etc. If it
-    found no libLLVM on import, it does not search again.
+    Dr.Jit is not restarted if kernels have run, a GPU holds values, or Mitsuba objects are alive: these would be lost.
+    The functions for a restart are available only in C++, under the mangled names that Linux and macOS give to
+    `jit_shutdown(int)` and others. If Dr.Jit found no libLLVM when it was imported, it does not search again.
     """
     import ctypes
 

@@ -1,14 +1,14 @@
-"""Open families of members: materials, distributions, laws, verbs, ...
+"""Registries of members: materials, distributions, laws, commands and other families.
 
-Members come from three sources; there is no list to edit:
+A member is added in one of three ways; there is no central list to edit:
 
-    one file in the family's folder                     all members in `src/gonio`
+    a file in the family's folder                       all members in `src/gonio`
     an entry point of an installed package              [project.entry-points."gonio.models"]  ward = "mypackage:Ward"
-    `go.register(Ward)`, in a program or as a decorator
+    a call of `go.register(Ward)`, also as a decorator
 
-Names are unique in a family. Adding a member under an existing name is an error, unless the existing member is
-`overridable` (Gonio's historic models, whose names users are likely to choose), or it is the same class again,
-from a file that was loaded anew.
+Names are unique within a family. Adding a member under an existing name is an error, with two exceptions: the existing
+member is `overridable` (Gonio's historic models, whose names users are likely to choose), or the new member is the same
+class, loaded again from its file.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ Member = TypeVar("Member")
 class Family(Generic[Member]):
     """The members of one family, by name.
 
-    kind     the noun for a member in errors, "material"
-    group    the entry-point group, "gonio.models"
+    kind     the noun for a member in error messages, such as "material"
+    group    the entry-point group, such as "gonio.models"
     folders  packages whose modules define members; imported on first use
-    member   maps an object of a module or entry point to (name, member); to None if it is not a member
+    member   maps an object of a module or entry point to (name, member), or to None if the object is not a member
     where    the location in errors about unknown names
     """
 
@@ -69,9 +69,9 @@ class Family(Generic[Member]):
         return dict(sorted({**self._shipped, **self._added}.items()))
 
     def get(self, name: str, where: str = "") -> Member:
-        """The member of that name. Raises InputError, with the closest known name, if there is none.
+        """The member with a given name. Raises InputError, which suggests the closest known name, if there is none.
 
-        where  the location that the error names; "": the family's
+        where  the location that the error names; that of the family if empty
         """
         if self._shipped is None:
             self.all()
@@ -83,7 +83,7 @@ class Family(Generic[Member]):
         raise InputError(f"unknown {self.kind} '{name}'", where or self.where, did_you_mean(name, list(self.all())))
 
     def titles(self) -> dict[str, str]:
-        """Name -> first line of the member's docstring, without its full stop, as help and manual print it."""
+        """The first line of each member's docstring, without its period, by the member's name."""
         return {name: (member.__doc__ or name).splitlines()[0].rstrip(".") for name, member in self.all().items()}
 
     def add(self, thing: object, where: str = "register") -> str:
@@ -114,8 +114,10 @@ class Family(Generic[Member]):
         return name
 
     def portable(self, name: str) -> Member | type | str:
-        """The identity of a member for another process: its class, or the given instance, if this program added it;
-        otherwise its name."""
+        """An object from which another process obtains the same member.
+
+        This is the class or instance itself if this program added it, otherwise the name.
+        """
         if name in self._announced_names or name not in self._added:
             return name
         member = self._added[name]
@@ -143,7 +145,7 @@ class Family(Generic[Member]):
         self._added.pop(name, None)
 
     def _announced(self, point: EntryPoint) -> None:
-        """Load the members of an installed package; a broken package causes only a warning."""
+        """Load the members of an installed package; an error in the package causes only a warning."""
         where = f"entry point {self.group}: {point.name} = {point.value}"
         try:
             self._announced_names.add(self.add(point.load(), where))
@@ -161,14 +163,17 @@ class Family(Generic[Member]):
 
 def _modules(package: str) -> list[ModuleType]:
     """The modules of a package, imported."""
-    with garbage.paused():  # imports leave no garbage, whose search would take 7 % of a command's start
+    with garbage.paused():  # imports create no garbage; collection would take 7 % of a command's start-up time
         entries = pkgutil.iter_modules(importlib.import_module(package).__path__)
         return [importlib.import_module(f"{package}.{entry.name}") for entry in entries]
 
 
 def _entry_points(group: str) -> Iterable[EntryPoint]:
-    """The entry points of a group. Metadata files are first searched for the group's name, since loading
-    importlib.metadata takes longer than the rest of `gonio --help`."""
+    """The entry points of a group.
+
+    Metadata files are first searched for the group's name, because loading importlib.metadata takes longer than the
+    rest of `gonio --help`.
+    """
     # importlib.metadata can read inside a zip
     if any(Path(place).is_file() or _declares(place, group.encode()) for place in sys.path):
         from importlib.metadata import entry_points
@@ -189,7 +194,7 @@ def _declares(folder: str, group: bytes) -> bool:
 
 
 Thing = TypeVar("Thing")
-registered: list[str] = []  # names that this program added, which other processes do not know
+registered: list[str] = []  # names that this program added, which do not exist in other processes
 
 
 def register(thing: Thing) -> Thing:
@@ -198,8 +203,8 @@ def register(thing: Thing) -> Thing:
         @go.register
         class Ward(go.BSDF): ...
 
-    It is then available by name like Gonio's own members. Returns the object unchanged. Raises InputError if it belongs
-    to no family, or if its name belongs to another member.
+    The member is then available by name, as Gonio's own members are. Returns the object unchanged. Raises InputError if
+    the object belongs to no family, or if another member already has its name.
     """
     registered.append(family_of(thing).add(thing))
     return thing
@@ -232,7 +237,7 @@ def _settings(member: object) -> dict[str, str]:
 
 
 def _source(member: object) -> tuple[str, str]:
-    """File (or module) and name of a member, which stay the same if its class is loaded again."""
+    """File (or module) and name of a member; they do not change if its class is loaded again."""
     thing = member if isinstance(member, type) or callable(member) else type(member)
     module = sys.modules.get(thing.__module__)
     file = str(getattr(module, "__file__", None) or thing.__module__)
@@ -252,8 +257,11 @@ def subclasses_of(base: type[Member]) -> Callable[[object], tuple[str, type[Memb
 
 
 def instances_of(base: type[Member]) -> Callable[[object], tuple[str, Member] | None]:
-    """A `member` function for families of instances: accepts classes, instantiated without arguments, and instances,
-    whose values become part of the name: "gtr-gamma-1.5"."""
+    """A `member` function for families of instances: accepts instances, and classes, which it instantiates.
+
+    The constructor is called without arguments. The values of a given instance become part of the name, as in
+    "gtr-gamma-1.5".
+    """
 
     def member(thing: object) -> tuple[str, Member] | None:
         if isinstance(thing, base):

@@ -5,8 +5,8 @@
     import gonio.mitsuba
     bsdf = mi.load_dict({"type": "gonio_conductor", "preset": "Au", "alpha": 0.2})
 
-The order of the imports does not matter. The import sets a variant only if none is set, and registers the plugins again
-whenever the variant changes.
+The order of the imports does not matter. This import sets a variant only if none is set. It registers the plugins, and
+registers them again whenever the variant changes.
 """
 
 from __future__ import annotations

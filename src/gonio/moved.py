@@ -1,6 +1,7 @@
-"""Redirect import paths of Gonio 0.1 that have moved, for one more release, with a warning that names the new path.
+"""Redirect imports of modules that have moved since Gonio 0.1, with a warning that names the new path.
 
-`_MOVED` maps old packages and modules to new ones; submodules follow. Delete this file after one release.
+`_MOVED` maps old packages and modules to new ones, and thereby their submodules. The redirects are kept for one more
+release; delete this file afterward.
 """
 
 from __future__ import annotations
@@ -115,7 +116,7 @@ _MOVED = {
 
 
 def new_name(name: str) -> str:
-    """The present name of a module of 0.1; "" if it has not moved."""
+    """The current name of a module of Gonio 0.1; "" if the module has not moved."""
     head, _, tail = name.removeprefix("gonio.").rpartition(".")
     if name.removeprefix("gonio.") in _MOVED:
         return "gonio." + _MOVED[name.removeprefix("gonio.")]
@@ -124,9 +125,10 @@ def new_name(name: str) -> str:
 
 
 class _Finder:
-    """Finds moved modules; Python asks it last, for names that no other finder knows.
+    """Finds moved modules. It is the last finder, so Python calls it only for names that no other finder has found.
 
-    Not derived from the base classes in `importlib.abc`, whose import would take a sixth as long as Gonio's.
+    It does not derive from the base classes in `importlib.abc`, because importing these would take a sixth of the time
+    that importing Gonio takes.
     """
 
     def find_spec(
@@ -149,7 +151,7 @@ class _Finder:
 
 
 class _Alias(ModuleType):
-    """A module of 0.1 that forwards every attribute to its replacement."""
+    """A module of Gonio 0.1 that forwards every attribute access to its replacement."""
 
     def __getattr__(self, name: str) -> object:
         if name.startswith("__"):

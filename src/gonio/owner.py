@@ -1,9 +1,9 @@
 """Let only one thread at a time use Dr.Jit and Mitsuba.
 
-Both are imported lazily, have one variant for all threads, and order kernels only within a thread; the recorder has a
-single stack. Every public call that computes therefore holds `COMPUTING` until its values are available, so calls from
-several threads, or through `asyncio.to_thread`, wait for each other. Code that uses Dr.Jit or Mitsuba in other threads
-must hold the lock too:
+Dr.Jit and Mitsuba are imported lazily, have one variant for all threads, and order kernels only within a thread; all
+threads share one recording stack. Every public function that computes therefore holds the lock `COMPUTING` until its
+values are available, so calls from several threads, or through `asyncio.to_thread`, run one after another. Code that
+uses Dr.Jit or Mitsuba in other threads must hold the lock too:
 
     from gonio.owner import COMPUTING
     with COMPUTING:
@@ -30,19 +30,20 @@ R = TypeVar("R")
 # An RLock used with `with`: a lock implemented in Python could stay locked after a Ctrl-C between two of its lines.
 COMPUTING = threading.RLock()
 
-if hasattr(os, "register_at_fork"):  # not on Windows; the lock may be held by a thread that does not exist in the child
+# A thread that does not exist in the child process may hold the lock. The function is missing on Windows.
+if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=lambda: COMPUTING._at_fork_reinit())  # type: ignore[attr-defined]
 
 
 def settle() -> None:
-    """Wait for the kernels of this thread; another thread would not wait for them."""
+    """Wait for the kernels of this thread, because Dr.Jit does not make other threads wait for them."""
     dr = sys.modules.get("drjit")
     if dr is not None and hasattr(dr, "sync_thread"):
         dr.sync_thread()
 
 
 def exclusive(call: Callable[P, R]) -> Callable[P, R]:
-    """Wrap a function so that no other thread computes while it runs."""
+    """Wrap a function so that it holds the lock `COMPUTING` while it runs."""
 
     @functools.wraps(call)
     def held(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -54,7 +55,7 @@ def exclusive(call: Callable[P, R]) -> Callable[P, R]:
                 forget_frames(error, names_line=isinstance(cause, GonioError))
                 if cause is error:
                     raise
-                # raise an inner error without the outer one: errors that cause each other would form an endless chain
+                # raise the inner error without the outer one: two errors that cause each other form an endless chain
                 raise cause from (error if isinstance(cause, InputError) else None)
             finally:
                 settle()
@@ -65,11 +66,12 @@ def exclusive(call: Callable[P, R]) -> Callable[P, R]:
 def forget_frames(error: BaseException, names_line: bool = True) -> None:
     """Release the local variables of the frames in the tracebacks of an exception and its causes.
 
-    A notebook stores its last exception and with it the scene. Dr.Jit's virtual calls reach every living BSDF, so that
-    each later render would raise the same error. Errors that Dr.Jit wraps lose their tracebacks too, since from Python
-    3.12 on a cleared frame still holds its closure. GONIO_DEBUG=1 preserves everything for a debugger.
+    A notebook stores its last exception and thereby keeps the scene alive. Virtual calls in Dr.Jit include every BSDF
+    that is alive, so each later render would raise the same error. Exceptions that Dr.Jit wraps lose their tracebacks
+    too, because a cleared frame still holds its closure from Python 3.12 on. GONIO_DEBUG=1 preserves everything for a
+    debugger.
 
-    names_line  whether its message names the line of user code, which is otherwise looked up in its causes
+    names_line  whether the message already names the line of user code; otherwise tracebacks that contain it are kept
     """
     if os.environ.get("GONIO_DEBUG"):
         return
@@ -88,5 +90,5 @@ def forget_frames(error: BaseException, names_line: bool = True) -> None:
 
 
 def public(call: Callable[P, R]) -> Callable[P, R]:
-    """Mark a public function: its arguments are `checked`, and it runs `exclusive`."""
+    """Decorate a public function: its arguments are checked (`checked`), and it holds the lock (`exclusive`)."""
     return exclusive(checked(call))

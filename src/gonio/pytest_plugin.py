@@ -1,11 +1,11 @@
-"""The pytest plugin: a fixture, and test items for materials that the command line names.
+"""The pytest plugin: a fixture, and test items for the materials named on the command line.
 
     def test_glass(gonio_verify):
         gonio_verify("glass.py:Glass")
 
     pytest --gonio glass.py:Glass --gonio mitsuba:roughplastic --gonio-quick
 
-Every pytest run loads this file if Gonio is installed, so it imports nothing of Gonio until it is used.
+If Gonio is installed, every run of pytest loads this file. It therefore imports nothing from Gonio until it is used.
 """
 
 from __future__ import annotations
@@ -36,8 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def gonio_verify() -> Callable[..., Report]:
-    """Fail the test if a material violates a law: gonio_verify(material or target, ...), with arguments as for
-    `check`."""
+    """The function `check`, which fails the test if a material violates a law: gonio_verify(material)."""
     return check
 
 
@@ -48,15 +47,16 @@ def check(
     breaks: Mapping[str, float] | Collection[str] = (),
     **more: Any,
 ) -> Report:
-    """The report of a material that satisfies its laws; otherwise the test fails with the report's text.
+    """Test a material, and fail the test with the text of the report if the material violates a law.
 
-    target  a material, or the name of a target as `gonio verify` takes it
+    target  a material, or the name of a target, as for `gonio verify`
     quick   whether to use fewer samples
-    law     the name of one law or several; None for all
-    breaks  names of laws that the material violates, or a mapping from these to the largest value allowed; the test
-            also fails if one of them holds
-    more    further keywords of `gonio.verify`: deep, seed, timeout, memory, isolated
-    A material that can be named, or sent to another process, is tested in that process, where it may crash.
+    law     the name of a law, or several names; None for all laws
+    breaks  names of the laws that the material may violate, or a mapping from these names to the largest allowed
+            violation; the test also fails if the material satisfies one of these laws
+    more    further keyword arguments of `gonio.verify`: deep, seed, timeout, memory, isolated
+    Returns the report.
+    If the material can be named or pickled, it is tested in a separate process, so that a crash does not end pytest.
     """
     __tracebackhide__ = True
     from .errors import InputError
@@ -160,7 +160,7 @@ class LawItem(pytest.Item):
 
 
 class Broken(Exception):
-    """A law does not hold."""
+    """Raised if a law does not hold."""
 
     def __init__(self, verdict: Verdict) -> None:
         self.verdict = verdict

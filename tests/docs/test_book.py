@@ -35,7 +35,7 @@ def test_every_public_name_has_its_place() -> None:
     listed = {name for names in api.TOPICS.values() for name in names.split()}
     classes = {model.__name__ for model in go.models().values()}
     assert set(go.__all__) - listed - classes == set()
-    assert "go.render" in str(api.pages()["reference/api/render-and-look.md"])
+    assert "go.render" in str(api.pages()["reference/api/rendering-and-plots.md"])
 
 
 def test_every_family_and_member_has_its_place() -> None:

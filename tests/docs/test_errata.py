@@ -39,6 +39,6 @@ def test_the_figures_of_a_thread_are_computed(title: str) -> None:
     assert ERRATA.section(title) in PAGE
 
 
-@pytest.mark.parametrize("title", ["Diffuse and specular, added", "A thin film, transmitted"])
+@pytest.mark.parametrize("title", ["Adding diffuse and specular lobes", "Thin films and transmitted light"])
 def test_figures_that_are_computed_at_once(title: str) -> None:
     assert ERRATA.section(title) in PAGE

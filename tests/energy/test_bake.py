@@ -258,7 +258,7 @@ def test_an_altered_file_is_refused(tmp_path, change):
         ({"layout": "homework", "lut": ["E", "glass"]}, "'glass' in the homework's layout"),
         ({"aspect": 0.0}, "alpha_y / alpha_x = 0"),
         ({"aspect": 0.5, "azimuths": 0}, "0 azimuths"),
-        ({"aspect": 0.5, "lut": ["glass"]}, "two widths"),
+        ({"aspect": 0.5, "lut": ["glass"]}, "anisotropic glass"),
     ],
 )
 def test_bad_options_are_refused_and_nothing_is_written(tmp_path, options, text):

@@ -159,7 +159,7 @@ def test_its_gradient_is_that_of_differences():
         (go.Mirror(), "perfectly specular part"),
         (go.two_sided(go.Lambert()), "seen from one side expected"),
         (go.RandomWalk(go.Conductor(alpha=0.5)), "is random"),
-        (go.mix(go.Lambert(), go.Conductor(alpha=(0.1, 0.5))), "two widths"),
+        (go.mix(go.Lambert(), go.Conductor(alpha=(0.1, 0.5))), "is anisotropic"),
     ],
     ids=["transmits", "half-mirror", "mirror", "two-sided", "random", "two-widths"],
 )

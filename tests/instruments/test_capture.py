@@ -219,7 +219,7 @@ def test_the_first_photographs_are_planned_from_a_guess(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_one_light_is_told_to_be_too_few(taken: Path) -> None:
     got = go.capture([str(taken / "p1.npz")], "lambert+ggx")
-    assert got.warnings[0].startswith("one light alone, difference angles of 2")
+    assert got.warnings[0].startswith("only one light, with difference angles of 2")
     assert len(got.chosen.maps) == 1
 
 

@@ -216,8 +216,8 @@ def test_what_a_table_of_one_value_for_both_orders_loses_is_said(tmp_path: Path)
     def notes(material: str, name: str) -> str:
         return " ".join(go.measure(material, tmp_path / name).notes)
 
-    assert "exchanging both directions changes f by" in notes("phong", "a.binary")
-    assert "exchanging" not in notes("phong", "a.gonio") + notes("oren-nayar", "b.binary")
+    assert "swapping the two directions changes f by" in notes("phong", "a.binary")
+    assert "swapping" not in notes("phong", "a.gonio") + notes("oren-nayar", "b.binary")
     assert "also transmits" in notes("dielectric", "d.gonio") and "transmits" not in notes("phong", "a.gonio")
 
 

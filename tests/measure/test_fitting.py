@@ -58,7 +58,7 @@ def test_a_metal_is_found_again_with_its_indices() -> None:
     np.testing.assert_allclose(found.values[-1], known[-1], rtol=0.01)
     np.testing.assert_allclose(found.values, known, rtol=0.1)  # eta and k of red are tied: 2 % at a full table
     assert np.all(np.abs(found.values - known) < 4.0 * found.errors)
-    assert any("tied" in note for note in found.notes)
+    assert any("strongly correlated" in note for note in found.notes)
 
 
 @pytest.mark.slow
@@ -66,7 +66,7 @@ def test_what_a_misfit_correlates_is_not_tied_and_intervals_stay_in_range() -> N
     """The channels of a Lambertian are independent, though the gloss that it lacks moves all three."""
     found = fit(table(PLASTIC), "lambert")
     assert abs(found.correlation[0, 1]) > 0.98, "the case that this is about"
-    assert not any("tied" in note for note in found.notes)
+    assert not any("strongly correlated" in note for note in found.notes)
     ends = fit(table(METAL), "oren-nayar").interval
     assert np.all(ends[:, 0] >= 0.0) and np.all(ends[:3, 1] <= 1.0)
 
@@ -358,7 +358,7 @@ def test_what_the_data_do_not_tell_is_said() -> None:
 def test_of_parts_that_do_the_same_one_moves(model: str, gone: str) -> None:
     found = fit(table(go.Lambert((0.3, 0.2, 0.1)), shape=(12, 12, 16)), model)
     assert not any(name.startswith(gone) for name in found.names)
-    assert f"{gone} is held at 0: a.albedo has the same effect" in found.notes
+    assert f"{gone} is fixed at 0: a.albedo has the same effect" in found.notes
     np.testing.assert_allclose(found.values[:3], [0.3, 0.2, 0.1], rtol=0.01)
 
 
@@ -493,7 +493,7 @@ def test_all_parameters_that_are_tied_stand_in_one_note() -> None:
     free = [Free(name, "float", 0.0, 1.0, False) for name in "abcd"]
     coupling = np.array([[1, 0.99, 0.5, 0], [0.99, 1, -0.995, 0], [0.5, -0.995, 1, 0], [0, 0, 0, 1]])
     notes = notes_on(free, np.full(4, 0.5), np.zeros(4, bool), coupling, tuple("abcd"))
-    assert notes == ["a, b and c are tied (largest correlation -0.995): fix one of them"]
+    assert notes == ["a, b and c are strongly correlated (largest correlation -0.995): fix one of them"]
 
 
 @pytest.mark.parametrize(

@@ -214,7 +214,7 @@ def test_adoption_names_equal_candidates_and_writes_short_numbers(tmp_path: Path
     )
     adopted = shaders.adopt(file)
     assert 'function = "brdfA"' in adopted.text and "default = 0.8\n" in adopted.text
-    assert any("as likely, and not taken: brdfB" in one for one in adopted.guesses)
+    assert any("other candidates: brdfB" in one for one in adopted.guesses)
 
 
 def test_function_that_writes_its_color_is_a_brdf(tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def test_header_and_manifest_state_the_same(tmp_path: Path) -> None:
     head = re.sub(r"\s*\n// ", " ", made.text.partition("\n\n")[0])
     for manifest in json.loads(json.dumps(made.manifest))["materials"]:
         stated = manifest["half"]
-        for path, errors in [("tables, as here,", stated["tables"]), *stated["parameters"].items()]:
+        for path, errors in [("tables (as here)", stated["tables"]), *stated["parameters"].items()]:
             if errors is not None:
                 assert f"{path} eval {errors['eval']['max']:.1e} (mean {errors['eval']['mean']:.1e})" in head
     tables = made.manifest["materials"][0]["half"]["tables"]
@@ -68,7 +68,7 @@ def test_layers_that_are_off_are_left_out() -> None:
 def test_numbers_that_overflow_are_refused() -> None:
     table = go.ops.Table("bright", np.array([[1.0], [7e4]]))
     assert pixels(table).max() == 7e4
-    with pytest.raises(go.InputError, match="table bright holds 70000, which 16 bits cannot hold"):
+    with pytest.raises(go.InputError, match="table bright contains 70000, which 16 bits cannot represent"):
         pixels(table, 16)
 
 

@@ -168,7 +168,7 @@ def test_every_file_is_python(language: str) -> None:
 
 
 def test_a_file_holds_one_material_and_takes_no_prefix() -> None:
-    with pytest.raises(go.InputError, match="2 materials given, but a numpy file holds one"):
+    with pytest.raises(go.InputError, match="2 materials given, but a numpy file contains one"):
         go.emit([GOLD, go.Lambert()], "numpy")
-    with pytest.raises(go.InputError, match="a prefix, a binding or a form of tables given, but a numpy file"):
+    with pytest.raises(go.InputError, match="a prefix, a binding or a table format given, but a numpy file"):
         bundle(GOLD, "numpy", placement=Placement("g_"))

@@ -126,9 +126,9 @@ def test_tables_of_a_bundle_are_in_the_files_that_its_manifest_names(form: str, 
 
 def test_forms_that_do_not_exist_or_do_not_fit_are_refused() -> None:
     for lang, form, text in (
-        ("glsl", "ktx", "unknown form 'ktx'"),
-        ("osl", "ktx2", "OSL reads tables in its own form"),
-        ("numpy", "ktx2", "a form of tables given, but a numpy file stands alone"),
+        ("glsl", "ktx", "unknown format 'ktx'"),
+        ("osl", "ktx2", "OSL reads tables in its own format"),
+        ("numpy", "ktx2", "a table format given, but a numpy file is self-contained"),
     ):
         with pytest.raises(go.InputError, match=text):
             go.emit(go.KullaConty(GOLD), lang, tables=form)

@@ -56,7 +56,7 @@ def _refused(folder: Path, text: str, suffix: str = "glsl") -> InputError:
         (BRDF % "bareer();", "'bareer' : no matching overloaded function found", "a.glsl:2"),
         (f"{BUFFER}\n" + BRDF % "c[0] = 1.0;", "a write to the buffer 'c'", "a.glsl:3"),
         (f"{BUFFER}\n" + BRDF % "for (int i = 0; i < 2; i++) c[i] += L.x;", "a write to the buffer 'c'", "a.glsl:3"),
-        (BRDF % f"float x = {'(' * 9999}1.0{')' * 9999};", "nest too deep", "a.glsl:2"),
+        (BRDF % f"float x = {'(' * 9999}1.0{')' * 9999};", "nested too deeply", "a.glsl:2"),
     ],
 )  # fmt: skip
 def test_what_a_bsdf_cannot_have_is_named(tmp_path: Path, text: str, what: str, where: str) -> None:

@@ -51,7 +51,7 @@ def test_no_range_is_invented() -> None:
     assert (axis.low, axis.high) == (0.0, 0.25)
     report = verify(Unbounded(), quick=True)
     assert report.passed, str(report)
-    assert "gain 0 to 0.25" in report.cards[0].covered
+    assert "gain from 0 to 0.25" in report.cards[0].covered
 
 
 class Painted(go.BSDF):

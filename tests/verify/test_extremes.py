@@ -47,9 +47,9 @@ def cause(fault: str) -> str:
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
-        ("overflow", "only for gain = 200: an overflow"),
-        ("black", "only for kd = 0: a division by it"),
-        ("u", "only where the first random number is 0: a logarithm of u"),
+        ("overflow", "only for gain = 200; possible mistake: an overflow"),
+        ("black", "only for kd = 0; possible mistake: a division by it"),
+        ("u", "only where the first random number is 0; possible mistake: a logarithm of u"),
     ],
 )
 def test_the_parameter_or_the_random_number_is_named(fault: str, words: str) -> None:
@@ -60,7 +60,7 @@ def test_a_number_is_named_only_if_it_alone_is_bad() -> None:
     u = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0], [0.5, 0.5, 0.5]])
     second = np.array([False, True, False, False])
     found = extremes.of_numbers([("weight", second, u)], (0.0,), "not finite")
-    assert found is not None and "weight is not finite only where the second random number is 0" in found.words
+    assert found is not None and "weight is not finite, but only where the second random number is 0" in found.words
     assert extremes.of_numbers([("weight", second | (u[:, 2] == 0.0), u)], (0.0,), "not finite") is None
     assert extremes.of_numbers([("pdf", second, None)], (0.0,), "not finite") is None
 
@@ -72,7 +72,7 @@ def test_views_beyond_the_critical_angle_are_named() -> None:
     found = extremes.of_views("weight", wo, below, "not finite", transmits=True)
     assert (
         found is not None
-        and "only for wo below the surface, at 42 degrees from the normal or more: total internal reflection?"
+        and "only for wo below the surface, 42 degrees or more from the normal; possible reason: total internal"
         in found.words
     )
     assert extremes.of_views("weight", wo, below | (wo[:, 2] > 0.5), "not finite", transmits=True) is None

@@ -36,7 +36,7 @@ def test_what_a_layered_model_switches_off_changes_nothing(name: str) -> None:
     verdict = verify(go.material(name), quick=True, law="limits")["limits"]
     assert verdict.status == "breaks as declared", verdict.why  # of metal alone
     assert all(
-        "values for a number and for an array differ" in note for note in verdict.notes if note.startswith("where")
+        "results for number and array parameters differ" in note for note in verdict.notes if note.startswith("where")
     )
 
 

@@ -32,7 +32,7 @@ CASES = {
 def test_operation_function_and_line_of_a_shader(tmp_path: Path, formula: str) -> None:
     (tmp_path / "mine.glsl").write_text(TEXT.format(formula=formula))
     words = origin.of(go.Shader(tmp_path / "mine.glsl"), WO, WI)
-    suffix = " in 32 bits" if formula.startswith("1e30") else ""
+    suffix = " in float32" if formula.startswith("1e30") else ""
     assert words == f"{CASES[formula]} in `inner` (mine.glsl:3){suffix}"
 
 

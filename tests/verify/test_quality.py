@@ -15,8 +15,11 @@ from gonio.verify.subject import of
 def test_lambert_has_no_variance_and_mirrors_cannot_be_compared_with_the_cosine() -> None:
     lambert, mirror = (quality.of(of(model)) for model in (go.Lambert(0.4), go.Mirror(0.9)))
     assert lambert is not None and lambert.failed == 0.0 and lambert.variance < 1e-9 and lambert.cosine == 1.0
-    efficiency = "1.0 times as efficient as cosine sampling, 100 % of the ideal efficiency"
-    assert lambert.words == f"sampling: 0 % of samples fail, variance of the weight 0, {efficiency}"
+    efficiency = "the efficiency is 1.0 times that of cosine sampling and 100 % of the ideal"
+    assert (
+        lambert.words
+        == f"sampling: 0 % of the samples fail, the relative variance of the weights is 0, and {efficiency}"
+    )
     assert mirror is not None and mirror.cosine is None and mirror.ideal == pytest.approx(1.0)
 
 

@@ -80,7 +80,7 @@ def test_brighter_eval_than_weight() -> None:
     bias = sampling(Brighter())
     assert bias.average == pytest.approx(0.05 / 1.05, rel=0.02) and bias.kind == "lost"
     assert bias.worst == pytest.approx(bias.average, rel=0.02) and bias.share == pytest.approx(1.0)
-    assert bias.grade is Grade.VISIBLE and "loses 4.8 % of the reflected light" in bias.words
+    assert bias.grade is Grade.VISIBLE and "a loss of 4.8 % of the reflected light" in bias.words
     assert sampling(ABitBrighter()).grade is Grade.INVISIBLE
 
 
@@ -192,7 +192,7 @@ def test_what_is_held_is_judged_alone() -> None:
     assert (
         verdict.failed
         and verdict.grade is Grade.INNER
-        and "with a correct material in its place, it holds" in verdict.cause
+        and "with a correct material in its place, the law holds" in verdict.cause
     )
 
 

@@ -96,7 +96,7 @@ export class PageApp implements App {
       this.environment = pictured.image.data === STUDIO.data ? studio(gl) : environmentFromData(gl, pictured.image.width, pictured.image.height, pictured.image.data);
     attachCamera(canvas, this.store, (x, y) => this.pick(x, y));
     this.store.subscribe((change) => this.respond(change));
-    canvas.addEventListener("webglcontextlost", () => this.say("The graphics driver has lost the page's pictures: reload the page.", "error"));
+    canvas.addEventListener("webglcontextlost", () => this.say("The graphics driver has reset the page's graphics context: reload the page.", "error"));
     new ResizeObserver(() => this.resized()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.themeChanged());
     addEventListener("hashchange", () => {

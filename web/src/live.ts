@@ -85,7 +85,7 @@ export class Live {
     });
     socket.addEventListener("close", () => {
       if (this.socket !== socket) return;
-      Object.assign(this.status, { connected: false, message: "the connection to the server is lost; reconnecting" });
+      Object.assign(this.status, { connected: false, message: "connection to the server lost; reconnecting" });
       this.onStatus();
       setTimeout(() => this.connect(), this.wait);
       this.wait = Math.min(this.wait * 2, 15_000);
@@ -118,7 +118,7 @@ export class Live {
     const { state } = app;
     // The server renders whole materials on balls: its picture would not match a single term or another shape.
     const supported = ["full", "compensated", "split"].includes(state.view.term);
-    this.status.message = !supported ? "of whole materials only" : state.view.mesh !== "sphere" ? "of spheres only" : "";
+    this.status.message = !supported ? "available only for complete materials" : state.view.mesh !== "sphere" ? "available only for spheres" : "";
     if (this.status.message) {
       this.sent = "";
       this.id += 1; // frames of older scenes that still arrive are dropped
@@ -199,7 +199,7 @@ export class Live {
   /** A layer or a choice whose shader the server is writing: the picture is the earlier one until it arrives. */
   private showWaiting(): void {
     const titles = new Set([...this.requests.values()].map(({ title }) => title));
-    this.app.onBusy("server", titles.size ? `The server writes the shader of ${[...titles].join(", ")}` : null);
+    this.app.onBusy("server", titles.size ? `Waiting for the server to generate the shader of ${[...titles].join(", ")}` : null);
   }
 
   /** Drops all requests, which will not be answered. */

@@ -1,4 +1,4 @@
-"""The only importer of Mitsuba: its engine, adapter, native BSDFs and scene files."""
+"""The only package that imports Mitsuba: variants, plugins for Gonio's models, and Mitsuba's BSDFs as materials."""
 
 from ..files import check_current_folder
 

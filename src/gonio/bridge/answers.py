@@ -1,4 +1,4 @@
-"""The result of one kind of query to a BSDF, for the verifier's `calls` law."""
+"""The result of a call of a BSDF's methods, for the law `calls` of the verifier."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ Rows = tuple[str, str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class Answer(NamedTuple):
-    """A query and its result.
+    """A call and its result.
 
-    what   the call, such as "eval_pdf"
-    wrong  a description of the error in the result; "" if there is none
+    what   name of the call, such as "eval_pdf"
+    wrong  description of the error in the result; "" if there is no error
     share  error as a fraction of the reflected light, if the error affects pictures
-    worst  largest error relative to the value for a single pair of directions
-    rows   two values that should be equal: their names, wo and wi, (N, 3), and the values, (N, channels)
+    worst  largest relative error for a single pair of directions
+    rows   two sets of values that should be equal: their names, wo and wi, (N, 3), and the values, (N, channels)
     """
 
     what: str

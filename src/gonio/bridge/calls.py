@@ -1,8 +1,8 @@
-"""The calls that Mitsuba's integrators make in addition to eval, pdf and sample, compared with those three.
+"""Compare the results of the calls that Mitsuba's integrators make with those of eval, pdf and sample.
 
-Path tracers call `eval_pdf` and `eval_pdf_sample`, disable lanes with `active`, request single components and types,
-and read flags first; denoisers call `eval_diffuse_reflectance`. A plugin that implements one of these separately may
-have an error there and still pass every test of the others.
+Path tracers read the flags, call `eval_pdf` and `eval_pdf_sample`, disable lanes with `active`, and request single
+components and types; denoisers call `eval_diffuse_reflectance`. If a plugin implements one of these methods separately,
+it may contain an error although the other methods pass every test.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from .answers import Answer
 from .types import BSDFContext, BSDFPlugin, BSDFSample, OfVariant, SurfaceInteraction
 
 COUNT = 4096
-SAME = 1e-4  # relative tolerance, for float32 and kernels that are fused differently
-SIGMAS = 6.0  # standard deviations beyond which a difference of two means is not due to chance
+SAME = 1e-4  # relative tolerance, because of float32 rounding and differently fused kernels
+SIGMAS = 6.0  # number of standard deviations beyond which a difference of two means is not due to chance
 LEAST = 0.02  # smallest difference of means that is reported
 FEW = 0.002  # fraction of rows that rounding errors may move across a discontinuity
 
 
 def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
-    """The result of every call at the given surface interaction, which has COUNT lanes and whose wi is replaced.
+    """The result of every call at a surface interaction.
 
-    seed  seed of the directions
+    si    the surface interaction, with COUNT lanes; its `wi` is replaced
+    seed  seed of the random directions
     """
     trial = _Trial(bsdf, si, seed)
     for what, asked in (
@@ -50,12 +51,12 @@ def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Ans
             yield Answer(what, wrong)
 
 
-# Calls of path tracers: an error in them changes pictures.
+# The calls of path tracers, in which an error changes pictures
 BY_PATH_TRACERS = ("eval_pdf", "eval_pdf_sample", "shading frame")
 
 
 class _Difference(NamedTuple):
-    """Two values that should be equal, (N, channels), their names, and the directions, (N, 3)."""
+    """Two sets of values that should be equal, (N, channels), their names, and the directions, (N, 3)."""
 
     name: str
     other: str
@@ -69,7 +70,7 @@ class _Difference(NamedTuple):
         off = np.nan_to_num(np.abs(self.got - self.expected), nan=0.0)
         share = float(np.sum(off)) / total if total > 0.0 else 1.0
         worst = float(np.max(off / np.maximum(np.abs(self.expected), 1e-3 * np.abs(self.expected).max()), initial=0.0))
-        # Mitsuba's wi points to the viewer
+        # Mitsuba's wi points toward the viewer
         return Answer(what, wrong, share, worst, (self.name, self.other, self.wi, self.wo, self.got, self.expected))
 
 
@@ -86,7 +87,7 @@ class _Trial:
         u = rng.random((3, COUNT), dtype=np.float32)
         self.wo, self.u = _vector(wo), (mi.Float(u[0]), mi.Point2f(u[1], u[2]))
         si.wi = _vector(wi)
-        # Half of the pairs are the plugin's own samples, to cover narrow lobes.
+        # In half of the pairs, wo is sampled by the plugin, in order to cover narrow lobes.
         drawn, _ = bsdf.sample(self.ctx, si, *self.u)
         usable = (np.arange(COUNT) % 2 == 0) & (np.abs(np.linalg.norm(_rows(drawn.wo), axis=1) - 1.0) < 1e-3)
         self.wo = _vector(np.where(usable[:, None], _rows(drawn.wo), wo))
@@ -135,7 +136,7 @@ class _Trial:
             "sample's weight": (self.color(weight), self.weight),
         }
         for name, (got, expected) in asked.items():
-            # Many of Mitsuba's own plugins do not mask the pdf and weight of inactive lanes; integrators discard them.
+            # Many of Mitsuba's own plugins do not mask the pdf and weight of inactive lanes; integrators ignore them.
             if name.startswith("eval") and "pdf's pdf" not in name and np.any(got[~live] != 0.0):
                 return f"{name} of inactive lanes is {np.abs(got[~live]).max():.4g}, 0 expected"
             wrong = self.unlike(f"{name} of the other lanes", "what it is with all lanes on", got[live], expected[live])
@@ -212,7 +213,7 @@ class _Trial:
         return self.parts(contexts, "reflection and transmission")
 
     def rotated_frame(self) -> str:
-        """Whether a surface rotated in space together with its tangents has the same values: directions are local."""
+        """Whether values remain the same if the surface and its tangents are rotated, because directions are local."""
         frame = mi.Frame3f(mi.Vector3f(0.48, 0.6, 0.64), mi.Vector3f(-0.8, 0.6, 0.0), mi.Vector3f(-0.36, -0.48, 0.8))
         frame = mi.Frame3f(dr.normalize(dr.cross(frame.t, frame.n)), frame.t, frame.n)
         si = mi.SurfaceInteraction3f(self.si)
@@ -220,10 +221,10 @@ class _Trial:
         bs, weight = self.bsdf.sample(self.ctx, si, *self.u)
         value = self.color(self.bsdf.eval(self.ctx, si, self.wo))
         return (
-            self.unlike("eval on a tilted surface", "eval", value, self.value)
-            or self.unlike("pdf on a tilted surface", "pdf", _rows(self.bsdf.pdf(self.ctx, si, self.wo)), self.pdf)
-            or self.unlike("sample's weight on a tilted surface", "sample's weight", self.color(weight), self.weight)
-            or self.unlike("a sample's wo on a tilted surface", "a sample's wo", _rows(bs.wo), _rows(self.drawn.wo))
+            self.unlike("eval on a rotated surface", "the original eval", value, self.value)
+            or self.unlike("pdf on a rotated surface", "pdf", _rows(self.bsdf.pdf(self.ctx, si, self.wo)), self.pdf)
+            or self.unlike("the weight on a rotated surface", "the original weight", self.color(weight), self.weight)
+            or self.unlike("a sample's wo on a rotated surface", "the original", _rows(bs.wo), _rows(self.drawn.wo))
         )
 
     def textured(self) -> str:
@@ -243,8 +244,11 @@ class _Trial:
         )
 
     def null_transmission(self) -> str:
-        """Whether the unscattered transmission, which integrators query for shadow rays through surfaces, equals the
-        contribution of null samples. The base class, and thus a plugin without this method, returns 0."""
+        """Whether `eval_null_transmission` equals the contribution of null samples.
+
+        Integrators call it for shadow rays through surfaces. The base class returns 0, and so do plugins that do not
+        override it.
+        """
         null = self.lit & (
             np.broadcast_to(np.asarray(self.drawn.sampled_type.numpy()), COUNT) & int(mi.BSDFFlags.Null) > 0
         )
@@ -255,7 +259,7 @@ class _Trial:
         return self.unlike("eval_null_transmission", "weight x pdf of null samples", value[null], carried)
 
     def parts(self, contexts: Sequence[tuple[str, BSDFContext, int | None]], words: str) -> str:
-        """Whether components requested one by one add up to the total and return samples of the requested component."""
+        """Whether components requested one by one add up to the total, and samples belong to the requested one."""
         total = np.zeros_like(self.value)
         for name, ctx, number in contexts:
             value = self.color(self.bsdf.eval(ctx, self.si, self.wo))
@@ -269,7 +273,7 @@ class _Trial:
             component = np.broadcast_to(np.asarray(bs.sampled_component.numpy()), COUNT)
             if number is not None and np.any(lit & (component != number)):
                 strange = int(component[lit & (component != number)][0])
-                return f"{name} requested, but sample returns component {strange}"
+                return f"{name} is requested, but sample returns component {strange}"
             wrong = self.shares(name, bs, self.color(weight)) or self.drawn_by_pdf(name, ctx, bs, self.color(weight))
             if wrong:
                 return wrong
@@ -278,21 +282,23 @@ class _Trial:
         return ""
 
     def shares(self, name: str, bs: BSDFSample, weight: np.ndarray) -> str:
-        """Whether weight x pdf of a delta lobe is the same if it is requested alone or chosen among others."""
+        """Whether weight x pdf of a delta lobe is the same if the lobe is requested alone or sampled among others."""
         delta = _is_delta(bs)
         wo, drawn = _rows(bs.wo), _rows(self.drawn.wo)
-        # at grazing angles, mirrored and straight directions are close together, on opposite sides of the surface
+        # at grazing angles, reflected and straight directions are close together, on opposite sides of the surface
         same = (np.abs(wo - drawn).max(1) < 1e-3) & (np.sign(wo[:, 2]) == np.sign(drawn[:, 2]))
         both = delta & self.delta & same & self.lit & np.any(weight > 0.0, axis=1)
         if both.sum() < 20:
             return ""
         single, among = (weight * _rows(bs.pdf))[both], (self.weight * _rows(self.drawn.pdf))[both]
-        return self.unlike(f"what the delta lobe of {name} carries", "what it carries among the others", single, among)
+        return self.unlike(f"the light of the delta lobe of {name}", "its light among the others", single, among)
 
     def drawn_by_pdf(self, name: str, ctx: BSDFContext, bs: BSDFSample, weight: np.ndarray) -> str:
-        """Whether samples requested of one component have the density that `pdf` returns for it: where the component
-        reflects light, their means of 1, of the cosine to the mirror direction and of cos^2 must equal those of all
-        samples, weighted by the ratio of the densities."""
+        """Whether samples of a requested component have the density that `pdf` returns for this component.
+
+        The means of 1, of the cosine to the mirror direction and of its square, over directions in which the component
+        reflects light, must equal those of all samples, weighted by the ratio of the densities.
+        """
         if self.delta.any() or _is_delta(bs).any():
             return ""
         other = self.drawn.wo
@@ -325,8 +331,8 @@ class _Trial:
         up = mi.Vector3f(0.0, 0.0, 1.0)
         # the default of Mitsuba's base class, which exceeds 1 for glossy BSDFs
         default = np.pi * self.color(self.bsdf.eval(self.ctx, self.si, up))
-        # Behind the surface, where `eval` may be 0, a plugin that forwards to a nested one would seem to have a method
-        # of its own.
+        # Behind the surface, where `eval` may be 0, a plugin that forwards the call to a nested BSDF would seem to
+        # implement the method itself.
         front = _rows(self.si.wi)[:, 2] > 0.0
         own = not np.allclose(value[front], default[front], rtol=1e-3, atol=1e-6)
         if own and (np.any(value < -1e-6) or np.any(value > 1.0 + 1e-3)):
@@ -341,7 +347,7 @@ class _Trial:
         return ""
 
     def unlike(self, name: str, other: str, got: np.ndarray, expected: np.ndarray) -> str:
-        """A description of the difference between two values; "" if there is none."""
+        """A description of the difference between two sets of values; "" if there is none."""
         if self.noisy:
             return ""
         got, expected = np.broadcast_arrays(got, expected)
@@ -361,7 +367,7 @@ class _Trial:
 
 
 def _is_delta(bs: BSDFSample) -> np.ndarray:
-    """Whether each sample belongs to a delta lobe or passes straight through, (COUNT,)."""
+    """Whether each sample belongs to a delta lobe or to a null interaction, (COUNT,)."""
     type_ = np.broadcast_to(np.asarray(bs.sampled_type.numpy()), COUNT)
     return np.asarray((type_ & (int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null))) > 0)
 
@@ -376,7 +382,7 @@ def _vector(rows: np.ndarray) -> mi.Vector3f:
 
 
 def _rows(value: OfVariant) -> np.ndarray:
-    """A value as (COUNT, k) in float64."""
+    """Convert a value to a float64 array of shape (COUNT, k)."""
     parts = (
         [np.asarray(c.numpy(), float) for c in value]
         if dr.is_vector_v(value)

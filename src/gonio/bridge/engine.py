@@ -19,7 +19,7 @@ DEVICES = ("auto", "cpu", "cuda")
 
 
 def _driver() -> ctypes.CDLL | None:
-    """NVIDIA's driver library if it is installed and can be initialized, else None; does not start Dr.Jit."""
+    """NVIDIA's driver library if it is installed and can be initialized, else None. Does not initialize Dr.Jit."""
     for name in ("libcuda.so.1", "nvcuda.dll"):
         with contextlib.suppress(OSError):
             driver = ctypes.CDLL(name)
@@ -34,7 +34,7 @@ def cuda_available() -> bool:
 
 
 def cuda_device() -> str:
-    """Name of the first device and the CUDA version of the driver; "none" without a device."""
+    """The name of the first device and the CUDA version of the driver; "none" if there is no device."""
     driver, name, version = _driver(), ctypes.create_string_buffer(256), ctypes.c_int(0)
     if driver is None or driver.cuDeviceGetName(name, len(name), 0) or driver.cuDriverGetVersion(ctypes.byref(version)):
         return "none"
@@ -42,7 +42,7 @@ def cuda_device() -> str:
 
 
 def variant_for(device: str = "cpu", spectral: bool = False) -> str:
-    """Mitsuba's variant for a device: "cpu" (LLVM), "cuda", or "auto" (CUDA if available)."""
+    """The name of Mitsuba's variant for a device: "cpu" (LLVM), "cuda", or "auto" (CUDA if available)."""
     if device not in DEVICES:
         raise InputError(f"unknown device '{device}'", "--device", "one of " + ", ".join(DEVICES))
     has_cuda = cuda_available() if device != "cpu" else False
@@ -52,20 +52,22 @@ def variant_for(device: str = "cpu", spectral: bool = False) -> str:
 
 
 def polarized(variant: str) -> str:
-    """The polarized spectral variant on the same device as another variant."""
+    """The polarized spectral variant for the same device as the given variant."""
     return "_".join([*variant.split("_")[:2], "spectral_polarized"])
 
 
 @exclusive
 def load(device: str | None = None, spectral: bool = False, threads: int | None = None) -> ModuleType:
-    """Import Mitsuba and set a variant: the current one if `device` is None and one is set, else that of `variant_for`.
+    """Import Mitsuba and set a variant. If `device` is None and a variant is set, it is not changed.
 
-    threads  number of cores to use; None keeps Dr.Jit's default (all)
-    Raises MachineError if no usable LLVM or no GPU is found, or if other users may change the kernels; InputError if
-    the current folder has been deleted.
+    device    "cpu", "cuda" or "auto", see `variant_for`; None selects "cpu" if no variant is set
+    spectral  whether to use a spectral variant
+    threads   number of cores to use; None uses Dr.Jit's default (all)
+    Raises MachineError if no usable LLVM or no GPU is found, or if other users may change the compiled kernels, and
+    InputError if the current folder has been deleted.
     """
     if "mitsuba" not in sys.modules:
-        files.check_current_folder()  # without one, importing Mitsuba ends the process
+        files.check_current_folder()  # if it has been deleted, importing Mitsuba ends the process
         backend.check_kernels()
     import mitsuba as mi
 
@@ -88,8 +90,10 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
 
 @functools.lru_cache
 def _own(mi: ModuleType) -> int:
-    """Guard the variant, which is shared by all threads, against changes while another thread computes, and prevent
-    plugins from being loaded from the current folder. Returns the number of threads that Dr.Jit had at first."""
+    """Prevent changes of the variant while another thread computes, and loading of plugins from the current folder.
+
+    All threads share the variant. Returns the initial number of threads of Dr.Jit.
+    """
     import drjit as dr
 
     plugin_search.confine(mi)
@@ -106,7 +110,7 @@ def _own(mi: ModuleType) -> int:
 
 @contextlib.contextmanager
 def using(variant: str) -> Iterator[None]:
-    """Use a variant inside the block, whatever another thread has set, and restore the previous one."""
+    """Use a variant inside the `with` block, regardless of other threads, and restore the previous one afterward."""
     import mitsuba as mi
 
     with COMPUTING:
@@ -123,10 +127,12 @@ def using(variant: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def put_back() -> Iterator[None]:
-    """Restore the variant and the number of threads after the block. If no variant was set before, a spectral one is
-    replaced by RGB on the same device, since the rest of a program expects three colors. If Mitsuba was not loaded
-    before, the number of threads becomes Dr.Jit's default: with one, Mitsuba can read no OpenEXR, see
-    `faults.exr_threads`."""
+    """Restore the variant and the number of threads after the `with` block.
+
+    If no variant was set before, a spectral variant is replaced by the RGB variant for the same device, because the
+    rest of a program expects three channels. If Mitsuba was not loaded before, the number of threads is set to Dr.Jit's
+    default, because Mitsuba cannot read OpenEXR files with one thread (see `faults.exr_threads`).
+    """
     loaded = sys.modules.get("mitsuba")
     before = None if loaded is None else loaded.variant()
     threads = None if loaded is None else sys.modules["drjit"].thread_count()

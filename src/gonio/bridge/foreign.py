@@ -1,10 +1,10 @@
-"""Mitsuba's BSDFs by name, by dictionary, or from files, as materials.
+"""Load Mitsuba's BSDFs by name, from a dictionary or from a file, as materials.
 
     rough = foreign.load({"type": "roughplastic", "alpha": 0.2})
     rough.eval(wo, wi)
     rougher = tree.replace(rough, {"alpha": 0.4})
 
-Numbers and albedos among the properties of a plugin become parameters of the material.
+The numbers and albedos among the properties of a plugin are parameters of the material.
 """
 
 from __future__ import annotations
@@ -26,15 +26,14 @@ from .faults.exr_threads import file_threads
 from .native import MitsubaBSDF
 from .types import BSDFPlugin, OfVariant, PluginDict
 
-# Below this, Mitsuba's documentation recommends the smooth plugin, and its float32 code is close to its limit.
+# For a smaller alpha, Mitsuba's documentation recommends the smooth plugin, and its float32 code becomes inaccurate.
 SMALLEST_ALPHA = 1e-3
 # Albedo-like properties of Mitsuba's own plugins, in [0, 1]; other colors are passed on unchanged
 ALBEDOS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "base_color")
 
 
-# Ranges of numeric properties of Mitsuba's own plugins, (default, low, high), from their pages in Mitsuba's
-# documentation (version 3.9, "BSDFs"). A property that is not listed has no known range and is tested at its current
-# value only.
+# Ranges of numeric properties of Mitsuba's own plugins, (default, low, high), from Mitsuba's documentation (version
+# 3.9, "BSDFs"). A property that is not listed has no known range and is tested only at its current value.
 _SHARE = (0.0, 0.0, 1.0)
 _PRINCIPLED = {"roughness": (0.5, 0.0, 1.0)} | dict.fromkeys(
     ("anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness"), _SHARE
@@ -51,14 +50,14 @@ RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
 
 
 class _Described(MitsubaBSDF):
-    """A BSDF that is built from a dictionary, and rebuilt when a parameter changes."""
+    """A BSDF that is built from a dictionary and is rebuilt when a parameter changes."""
 
     description: ClassVar[PluginDict] = {}
-    plugin: ClassVar[PluginDict] = {}  # in an instance: its description with parameter values
+    plugin: ClassVar[PluginDict] = {}  # in an instance, the dictionary with its parameter values
 
     @property
     def by_nature(self) -> Mapping[str, str]:
-        """Laws that plugins of this kind violate by design, with the reasons."""
+        """The laws that plugins of this kind violate by design, with the reasons."""
         return _BY_NATURE.get(str(self.description.get("type", "")), {})
 
     @property
@@ -67,11 +66,11 @@ class _Described(MitsubaBSDF):
         return {name: load(inner) for name, inner in self.description.items() if _is_bsdf(inner)}
 
     def rebuilt(self) -> MitsubaBSDF:
-        """The plugin, built again."""
+        """The material with a new instance of the plugin."""
         return load(self.plugin)
 
     def with_diffuse_inside(self) -> MitsubaBSDF:
-        """The same plugin with plain diffuse BSDFs nested in it."""
+        """The same plugin, in which nested BSDFs are replaced by diffuse ones."""
         return load({**self.description, **dict.fromkeys(self.held, _DIFFUSE)})
 
     def __post_init__(self) -> None:
@@ -90,7 +89,7 @@ class _Described(MitsubaBSDF):
 
 
 def load(description: PluginDict) -> MitsubaBSDF:
-    """The BSDF of a dictionary for `mi.load_dict`. Raises InputError if Mitsuba rejects it."""
+    """The BSDF described by a dictionary for `mi.load_dict`. Raises InputError if Mitsuba rejects it."""
     kind = str(description.get("type", ""))
     fields: dict[str, OfVariant] = {}
     known = RANGES.get(kind, {})
@@ -111,7 +110,7 @@ def load(description: PluginDict) -> MitsubaBSDF:
 
 
 def _built(description: PluginDict) -> BSDFPlugin:
-    """The plugin of a description. Raises InputError if Mitsuba rejects it."""
+    """Build the plugin that a dictionary describes. Raises InputError if Mitsuba rejects it."""
     mi = mitsuba()
     kind = str(description.get("type", ""))
     _check_plugins(description, f"mitsuba:{kind}")
@@ -126,7 +125,7 @@ def _built(description: PluginDict) -> BSDFPlugin:
 
 
 def _check_plugins(description: Mapping[str, object], location: str) -> None:
-    """Raise InputError if a description, or one nested in it, names a plugin that must not be loaded."""
+    """Raise InputError if a dictionary, or one nested in it, names a plugin that must not be loaded."""
     kind = description.get("type")
     if kind == "resources":
         raise InputError("'resources' given, but a BSDF has no search folders", location, "give the paths of files")
@@ -138,7 +137,7 @@ def _check_plugins(description: Mapping[str, object], location: str) -> None:
 
 
 def _albedos(bsdf: BSDFPlugin) -> dict[str, float | tuple[float, ...]]:
-    """The albedos of a plugin that are a single number or color."""
+    """The albedos of a plugin that are constant numbers or colors."""
     import mitsuba as mi
 
     held = mi.traverse(bsdf)
@@ -162,11 +161,11 @@ def _is_bsdf(value: object) -> bool:
 
 
 def plugins() -> list[str]:
-    """Names of the BSDF plugins that ship with Mitsuba."""
+    """The names of the BSDF plugins that Mitsuba ships."""
     return sorted(_NESTS)
 
 
-# Mitsuba does not report a plugin's kind without building it; these are the properties that each needs to be built.
+# Mitsuba does not report the kind of a plugin without building it; these are the properties that each plugin requires.
 _DIFFUSE = {"type": "diffuse"}
 _NESTS: dict[str, PluginDict] = {
     "blendbsdf": {"weight": 0.5, "a": _DIFFUSE, "b": {"type": "roughconductor"}},
@@ -194,10 +193,10 @@ _NESTS: dict[str, PluginDict] = {
     "twosided": {"bsdf": {"type": "roughconductor"}},
 }
 
-# A frame that differs from the surface's has a preferred direction, and its cosines are not the surface's (Veach1997,
-# section 5.3). For this reason, Mitsuba's manual calls these two plugins an approximation.
+# A shading frame that is tilted relative to the surface has a preferred direction, and its cosines differ from those of
+# the surface (Veach1997, section 5.3). For this reason, Mitsuba's manual calls these two plugins an approximation.
 _TILTED_FRAME = {
-    "isotropy": "its shading normal is tilted to one side and rotates with the surface",
+    "isotropy": "the shading normal is tilted to one side and rotates with the surface",
     "reciprocity": "the cosine of wi is not taken with respect to the surface normal (Veach1997, section 5.3)",
     "energy": "light that the tilted frame reflects below the surface is cut off in one direction only",
 }
@@ -205,14 +204,14 @@ _BY_NATURE: dict[str, dict[str, str]] = {
     "bumpmap": _TILTED_FRAME,
     "normalmap": _TILTED_FRAME,
     "hair": {
-        "reciprocity": "the offset at which wo's ray hits the fiber is fixed, but differs on the reverse path",
+        "reciprocity": "the offset at which the ray along wo hits the fiber is fixed, but differs on the reverse path",
         "isotropy": "a fiber has an axis",
     },
 }
 
 
 def plugin(name: str, properties: Mapping[str, object]) -> MitsubaBSDF:
-    """A plugin by name with the given properties; plugins that need nested BSDFs get plain ones."""
+    """A plugin with a given name and properties. If it requires nested BSDFs, these are diffuse."""
     more: PluginDict = {}
     if name == "bumpmap" and "texture" not in properties:
         ramp = np.linspace(0.0, 0.2, 16, dtype=np.float32)
@@ -225,8 +224,10 @@ _registered: dict[Path, dict[str, object]] = {}  # plugins by the path of the fi
 
 
 def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | None:
-    """The plugin FILE.py:NAME, where NAME is the name under which the file registers it, or its class; None if the file
-    registers no such plugin."""
+    """The plugin FILE.py:NAME, where NAME is the name under which the file registers a plugin, or the plugin's class.
+
+    Returns None if the file registers no such plugin.
+    """
     path = Path(os.path.expanduser(target.rpartition(":")[0])).resolve()
     name = target.rpartition(":")[2]
     if not path.is_file() or b"mitsuba" not in path.read_bytes():
@@ -251,14 +252,16 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | No
 
 
 def _name_of(cls: object, registered: Mapping[str, object], file: str) -> str:
-    """The name under which a file registers a class of plugins, directly or by a function that constructs it. Raises
-    InputError if there is none."""
+    """The name under which a file registers a plugin class, directly or through a function that constructs it.
+
+    Raises InputError if the file does not register the class.
+    """
     name = getattr(cls, "__name__", "")
     by_class = next((kind for kind, make in registered.items() if make is cls), "")
     if by_class:
         return by_class
     for kind in registered:
-        with contextlib.suppress(InputError):  # it may need properties
+        with contextlib.suppress(InputError):  # the plugin may require properties
             if type(_built({"type": kind})) is cls:
                 return kind
     known = [f"{file}:{kind}" for kind in registered]
@@ -267,7 +270,7 @@ def _name_of(cls: object, registered: Mapping[str, object], file: str) -> str:
 
 
 def mitsuba() -> ModuleType:
-    """Mitsuba in an LLVM variant, with Gonio's plugins registered."""
+    """Load Mitsuba in an LLVM variant, and register Gonio's plugins."""
     mi = engine.load()
     if not mi.variant().startswith("llvm_"):
         what = f"variant {mi.variant()} is set, an LLVM variant expected"
@@ -278,9 +281,9 @@ def mitsuba() -> ModuleType:
 
 
 def rejected(error: Exception, name: str) -> InputError:
-    """Mitsuba's error for the description of the plugin `name`, as an InputError."""
+    """Convert an error of Mitsuba, raised for the dictionary of the plugin `name`, to an InputError."""
     text = " ".join(str(error).split())
     if "not found" in text and ("Plugin" in text or "plugin" in text):
         return InputError(f"Mitsuba has no plugin '{name}'", f"mitsuba:{name}", did_you_mean(name, plugins()))
-    # Mitsuba prefixes source lines and the object's description; the last sentence states the problem
+    # Mitsuba's message begins with source lines and the object's description; its last sentence states the problem
     return InputError(f"Mitsuba rejects it: {'...' + text[-200:] if len(text) > 200 else text}", f"mitsuba:{name}")

@@ -1,8 +1,9 @@
-"""A Mitsuba BSDF, built in or a user's plugin, as a material of its own or nested in one of Gonio's.
+"""A Mitsuba BSDF, built in or a user's plugin, as a material, which may be nested in one of Gonio's materials.
 
-Mitsuba's `wi` is Gonio's `wo`, and vice versa. Mitsuba's BSDFs read a surface interaction: those nested in a Gonio
-plugin get that of the ray, others one whose shading frame is the local frame, at uv = (0.5, 0.5). Values are float32,
-since the wheel has no 64-bit variant; a Mueller matrix is reduced to its value for unpolarized light.
+Mitsuba's `wi` is Gonio's `wo`, and vice versa. Mitsuba's BSDFs require a surface interaction. A BSDF nested in a Gonio
+plugin receives the interaction of the ray; any other BSDF receives one at uv = (0.5, 0.5), whose shading frame is the
+local frame. Values are float32, because Mitsuba's wheel has no double-precision variant. Mueller matrices are reduced
+to their values for unpolarized light.
 """
 
 from __future__ import annotations
@@ -24,48 +25,50 @@ from .types import BSDFContext, BSDFPlugin, Mask, SurfaceInteraction
 
 
 class MitsubaBSDF(BSDF):
-    """A BSDF of Mitsuba as a material."""
+    """A material that wraps a BSDF of Mitsuba."""
 
     precisions: ClassVar[tuple[str, ...]] = ("float32",)
     zero_weight_is_failure: ClassVar[bool] = True
     bsdf: ClassVar[BSDFPlugin]  # an attribute of each instance, but not a parameter
-    _si: ClassVar[SurfaceInteraction | None] = None  # in a copy bound by `at`: where it is evaluated
+    _si: ClassVar[SurfaceInteraction | None] = None  # the interaction at which a copy made by `at` is evaluated
     _active: ClassVar[Mask] = True
 
     def __init__(self, bsdf: BSDFPlugin) -> None:
         object.__setattr__(self, "bsdf", bsdf)
 
     def at(self, si: SurfaceInteraction, active: Mask) -> MitsubaBSDF:
-        """A copy that is evaluated at a surface interaction."""
+        """A copy of this material that is evaluated at a given surface interaction."""
         return binding.bound_copy(self, {"_si": si, "_active": active})
 
     # ------------------------------------------------------------------ formulas
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """Mitsuba's value, which includes the cosine."""
+        """The value of Mitsuba's BSDF, which includes the cosine."""
         value = self.bsdf.eval(context(mi, mode), self._interaction(wo), mi.Vector3f(wi), self._active)
         return _like(wo, mi.unpolarized_spectrum(value))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Mitsuba's sampling density, 1/sr."""
+        """The sampling density of Mitsuba's BSDF, 1/sr."""
         return self.bsdf.pdf(mi.BSDFContext(), self._interaction(wo), mi.Vector3f(wi), self._active)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
-        """A direction sampled from three numbers in [0, 1); null interactions, which pass straight through, count as
-        delta lobes."""
+        """Sample a direction with three random numbers in [0, 1).
+
+        Null interactions, in which light passes straight through, count as delta lobes.
+        """
         ctx, si, flags = context(mi, mode), self._interaction(wo), mi.BSDFFlags
         bs, value = self.bsdf.sample(ctx, si, mi.Float(u.x), mi.Point2f(u.y, u.z), self._active)
         weight = mi.unpolarized_spectrum(value)
         delta = mi.has_flag(bs.sampled_type, flags.Delta) | mi.has_flag(bs.sampled_type, flags.Null)
         pdf = bs.pdf
         if self._si is None:
-            # Mitsuba signals a failed sample by weight 0 with any pdf, as its own chi-square test assumes. However, a
-            # direction in which nothing is reflected, sampled with the density that `pdf` returns, is a valid sample.
-            # Where something is reflected, weight 0 is a lobe's sample on the wrong side of the surface, or a black
-            # lobe of a mix.
+            # Mitsuba signals a failed sample by the weight 0 with any pdf, as its own chi-square test assumes. However,
+            # a sample in a direction in which no light is reflected is valid if it has the density that `pdf` returns.
+            # If light is reflected in this direction, the weight 0 means that a lobe was sampled on the wrong side of
+            # the surface, or that a lobe of a mixture is black.
             stated, value = (call(ctx, si, bs.wo, self._active) for call in (self.bsdf.pdf, self.bsdf.eval))
             black = dr.all(mi.unpolarized_spectrum(value) == 0.0) & (dr.abs(stated - pdf) < 1e-3 * pdf)
             failed = dr.all(weight == 0.0) & ~((pdf > 0.0) & black)
@@ -73,7 +76,7 @@ class MitsubaBSDF(BSDF):
         return Sample(bs.wo, _like(wo, weight), pdf, delta, bs.eta)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The plugin's diffuse reflectance."""
+        """The diffuse reflectance of the plugin."""
         return mi.unpolarized_spectrum(self.bsdf.eval_diffuse_reflectance(self._interaction(wo), self._active))
 
     def _interaction(self, wo: Direction) -> SurfaceInteraction:
@@ -98,8 +101,10 @@ class MitsubaBSDF(BSDF):
     # ------------------------------------------------------------------ facts
 
     def renderer_calls(self, seed: int) -> Iterator[Answer]:
-        """The results of the calls that a renderer makes in addition to eval, pdf and sample; `seed` is that of the
-        directions."""
+        """The results of the calls that a renderer makes in addition to eval, pdf and sample.
+
+        seed  seed of the random directions
+        """
         front = dr.zeros(mi.Vector3f, calls.COUNT) + mi.Vector3f(0.0, 0.0, 1.0)
         return calls.answers(self.bsdf, self._interaction(front), seed)
 
@@ -127,6 +132,6 @@ def context(mi: ModuleType, mode: Mode) -> BSDFContext:
 
 
 def _like(wo: Direction, value: Spectrum) -> Spectrum:
-    """The value in 64 bits if wo has them, so that formulas can combine it with others."""
+    """The value in double precision if wo is in double precision, so that formulas can combine both."""
     types = backend.types_like(type(wo))
     return types.vec3(value) if dr.itemsize_v(types.float) == 8 else value

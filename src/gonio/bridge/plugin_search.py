@@ -1,12 +1,12 @@
-"""Which native plugins Mitsuba may load, and where it looks for them.
+"""Restrict the folders from which Mitsuba may load native plugins.
 
-Mitsuba loads `plugins/TYPE.so` from the first folder of its file resolver that contains it, otherwise from the current
-folder; this fallback cannot be disabled. Mitsuba searches even for types registered in Python, since `load_dict` looks
-up their kind in another variant. Therefore
+Mitsuba loads `plugins/TYPE.so` from the first folder of its file resolver that contains this file, and otherwise from
+the current folder; this fallback cannot be disabled. Mitsuba searches even for types registered in Python, because
+`load_dict` looks up their kind in another variant. Therefore
 
 - the resolver begins with Mitsuba's own folder and does not contain the current folder (`confine`),
 - a type named by a document is checked before Mitsuba reads the document (`check`),
-- a type is registered only if the current folder has no plugin of that name (`register`).
+- a type is registered only if the current folder has no plugin of this name (`register`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from types import ModuleType
 from ..errors import InputError
 from .types import OfVariant
 
-VARIABLE = "GONIO_PLUGINS"  # the user's folders, each with a subfolder `plugins` as in Mitsuba's own
+VARIABLE = "GONIO_PLUGINS"  # the user's folders, each of which has a subfolder `plugins`, as Mitsuba's own folder does
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 # plugins whose properties are memory addresses, which only the program that calls Mitsuba can provide
 _UNSAFE = ("blender",)
@@ -31,23 +31,22 @@ _UNSAFE = ("blender",)
 
 @functools.cache
 def package() -> Path:
-    """Mitsuba's own folder, with its plugins and data."""
+    """Mitsuba's own folder, which contains its plugins and data."""
     import mitsuba
 
     return Path(mitsuba.__file__).parent
 
 
 def trusted() -> list[Path]:
-    """The folders whose `plugins` may contain native code: Mitsuba's and those of GONIO_PLUGINS."""
+    """The folders whose subfolder `plugins` may contain native code: Mitsuba's own and those in GONIO_PLUGINS."""
     named = os.environ.get(VARIABLE, "").split(os.pathsep)
     return [package(), *(Path(folder).absolute() for folder in named if folder)]
 
 
 def confine(mi: ModuleType) -> None:
-    """Make Mitsuba search its own folder first, then those of GONIO_PLUGINS and of the program, but not the current
-    folder.
+    """Set Mitsuba's search path: its own folder, those in GONIO_PLUGINS, then those that the program has added.
 
-    On import, Mitsuba appends the folder that is current at that time, and its own.
+    The current folder, which Mitsuba appends when it is imported, is removed.
     """
     resolver = mi.file_resolver()
     paths = list(map(str, resolver))
@@ -61,7 +60,7 @@ def confine(mi: ModuleType) -> None:
 
 @contextlib.contextmanager
 def searching(mi: ModuleType, *folders: Path) -> Iterator[None]:
-    """Make Mitsuba also search these folders inside the block, after all others."""
+    """Append folders to Mitsuba's search path inside the `with` block."""
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
     for path in folders:
@@ -76,9 +75,9 @@ def searching(mi: ModuleType, *folders: Path) -> Iterator[None]:
 def check(name: str, location: str, folder: Path | None = None, allow_code: bool = False) -> Path | None:
     """Raise InputError if a plugin type named by a document would load untrusted native code.
 
-    location    file and line of the document that errors name
-    folder      the document's folder, whose `plugins` may be loaded if `allow_code` is set
-    Returns the file in that folder that will be loaded, else None.
+    location    file and line of the document, for errors
+    folder      folder of the document; plugins in its subfolder `plugins` may be loaded if `allow_code` is set
+    Returns the file in that subfolder that will be loaded, or None.
     """
     if not re.fullmatch(r"[^/\\.:\0]+", name):  # Mitsuba makes a path from it and drops everything after a dot
         raise InputError(f"'{name}' is not a plugin type", location, "a type is a name such as sphere, not a path")
@@ -106,7 +105,7 @@ def register(register_kind: Callable[[str, OfVariant], None], name: str, make: O
 
 
 def _refuse_current_folder(name: str, location: str) -> None:
-    """Raise InputError if Mitsuba would load the plugin of that name from the current folder."""
+    """Raise InputError if Mitsuba would load the plugin with this name from the current folder."""
     if os.path.exists(_file(name)) and not _is_trusted(name):
         what = f"Mitsuba would run {os.path.abspath(_file(name))}, native code in the current folder"
         hint = f"run Gonio in another folder, or if you trust the file, set {VARIABLE}={os.getcwd()}"
@@ -114,10 +113,10 @@ def _refuse_current_folder(name: str, location: str) -> None:
 
 
 def _is_trusted(name: str) -> bool:
-    """Whether the plugin is in a trusted folder, which Mitsuba searches first."""
+    """Whether a trusted folder contains the plugin; Mitsuba searches these folders first."""
     return any(os.path.exists(folder / _file(name)) for folder in trusted())
 
 
 def _file(name: str) -> str:
-    """Path of a plugin's file relative to a search folder."""
+    """The path of a plugin's file relative to a search folder."""
     return os.path.join("plugins", name + _SUFFIX)

@@ -1,14 +1,15 @@
 """Names for the types of Mitsuba and Dr.Jit.
 
-Both libraries ship type information for single variants only, but this package serves all variants: these names
-document what a value is and check nothing. Values of materials have their own types, in `gonio.ops.types`.
+Both libraries provide type information only for single variants, but this package supports all variants. These names
+therefore document the type of a value, but type checkers treat them as `Any`. Values of materials have their own types,
+in `gonio.ops.types`.
 """
 
 from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-OfVariant: TypeAlias = Any  # an object of a class that Mitsuba or Dr.Jit has once per variant
+OfVariant: TypeAlias = Any  # an object of a class that exists once per variant
 
 # Objects of Mitsuba
 Plugin: TypeAlias = OfVariant  # the result of loading a dictionary or a file
@@ -39,9 +40,9 @@ Record: TypeAlias = OfVariant  # any other record
 # Values with one entry per lane, of the variant's types
 Float: TypeAlias = OfVariant
 UInt: TypeAlias = OfVariant
-Whole: TypeAlias = OfVariant  # signed, 64 bits
+Whole: TypeAlias = OfVariant  # signed 64-bit integer
 Mask: TypeAlias = OfVariant
-Point: TypeAlias = OfVariant  # of two or three components
+Point: TypeAlias = OfVariant  # a point with two or three components
 Vector: TypeAlias = OfVariant
 Color: TypeAlias = OfVariant  # linear RGB
 Radiance: TypeAlias = OfVariant  # mi.Spectrum: the variant's channels, or Mueller matrices in polarized variants

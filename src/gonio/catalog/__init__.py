@@ -1,1 +1,1 @@
-"""Materials from strings and files: the notation, the library of named materials, documents, and user files."""
+"""Materials from strings and files: the notation, the library of published fits, documents, and user files."""

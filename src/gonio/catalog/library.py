@@ -1,10 +1,10 @@
-"""A hundred named materials: published fits to the measured BRDFs of the MERL database, as parameters.
+"""A library of a hundred materials: published parametric fits to the measured BRDFs of the MERL database.
 
-    go.material("alum-bronze")                                  Bagher2012's fit, a `shifted-gamma`
-    go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as go.fits("alum-bronze") lists
+    go.material("alum-bronze")                                  the fit of Bagher2012, a `shifted-gamma`
+    go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another fit, FILE/FIT; go.fits("alum-bronze") lists them
 
 On the command line and in scenes, the second is written alum-bronze:low2012/lowsmooth_E2. The files in `published/`
-contain the values as printed; this module converts them to parameters. Every fit is also a preset of its model.
+contain the values as printed, and this module converts them to parameters. Every fit is also a preset of its model.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from ..material import model, models
 from ..material.bsdf import BSDF, Preset
 from ..material.parameters import Value
 
-Figures: TypeAlias = "dict[str, Value]"  # as printed, by the name in the collection
+Figures: TypeAlias = "dict[str, Value]"  # values as printed, by their names in the publication
 
 FILES = ("bagher2012", "low2012", "ngan2005")
-DEFAULT = "bagher2012/sgd"  # the most recent, and one with all hundred materials
+DEFAULT = "bagher2012/sgd"  # the most recent fit, which includes all hundred materials
 _FOLDER = Path(__file__).parent / "published"
 
 
 class Fit(NamedTuple):
-    """One fit of a paper to its materials.
+    """The fits of one model to several materials, from one paper.
 
-    name       FILE/FIT, "low2012/lowsmooth_E2"
-    model      the material's model, by name
-    source     the paper, as a key of docs/references.bib
-    materials  material -> the model's parameters
+    name       FILE/FIT, such as "low2012/lowsmooth_E2"
+    model      name of the model
+    source     the paper, as a key in docs/references.bib
+    materials  parameters of the model, by the name of the material
     """
 
     name: str
@@ -47,29 +47,32 @@ class Fit(NamedTuple):
 
 
 def materials() -> list[str]:
-    """The names, in alphabetical order."""
+    """The names of all materials in the library, in alphabetical order."""
     return sorted(published()[DEFAULT].materials)
 
 
 def fits(name: str) -> list[str]:
-    """FILE/FIT of every fit of a material, the default first. Raises InputError for an unknown name."""
+    """The names FILE/FIT of all fits of a material; the default is first. Raises InputError for an unknown material."""
     _known(name, "material")
     return [fit.name for fit in published().values() if name in fit.materials]
 
 
 def knows(text: str) -> bool:
-    """Whether a string names a material of the library, even with an unknown fit."""
+    """Whether a string names a material of the library, possibly with an unknown fit."""
     return text.partition(":")[0] in published()[DEFAULT].materials
 
 
 def resembles(text: str) -> bool:
-    """Whether a string is the name of a material, with or without a fit, or closer to one than to a model's name."""
+    """Whether a string is, or is most similar to, the name of a library material rather than that of a model."""
     near = difflib.get_close_matches(text.partition(":")[0].lower(), [*materials(), *models()], n=1, cutoff=0.75)
     return bool(near) and near[0] in materials()
 
 
 def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
-    """(class, its preset's name) of NAME or NAME:FILE/FIT. Raises InputError, which names `where`, if it is unknown."""
+    """The class, and the name of its preset, for NAME or NAME:FILE/FIT.
+
+    Raises InputError, which names `where`, for an unknown material or fit.
+    """
     name, _, fit = text.partition(":")
     _known(name, where)
     fit = fit or DEFAULT
@@ -81,7 +84,8 @@ def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
 
 
 def presets(model_name: str) -> dict[str, Preset]:
-    """A model's fits as presets: "alum-bronze" for the default fit, else "alum-bronze:low2012/lowsmooth_E2"."""
+    """The fits of a model as presets, named "alum-bronze" for the default fit and
+    "alum-bronze:low2012/lowsmooth_E2" for others."""
     return {
         key: Preset(key, values, fit.source)
         for fit in published().values()
@@ -93,7 +97,7 @@ def presets(model_name: str) -> dict[str, Preset]:
 
 @lru_cache(maxsize=1)
 def published() -> dict[str, Fit]:
-    """Every fit by FILE/FIT, the default first."""
+    """All fits by their names FILE/FIT; the default is first."""
     fits: dict[str, Fit] = {}
     for file in FILES:
         data = json.loads((_FOLDER / f"{file}.json").read_text())
@@ -109,7 +113,7 @@ def published() -> dict[str, Fit]:
 
 
 def _unpacked(numbers: list[float], shapes: Mapping[str, tuple[int, ...]]) -> Figures:
-    """A material's values from a flat list, by parameter: numbers, colors, pairs of colors."""
+    """Convert the flat list of a material's numbers to values by parameter: numbers, colors, and pairs of colors."""
     figures: Figures = {}
     at = 0
     for name, shape in shapes.items():
@@ -137,7 +141,7 @@ def _known(name: str, where: str) -> None:
 
 
 def _index(f0: float) -> float:
-    """The index with normal reflectance f0: Schlick's formula receives F0 as an index."""
+    """The index of refraction with the normal reflectance f0, because Gonio's Schlick term takes F0 as an index."""
     root = math.sqrt(f0)
     return (1.0 + root) / (1.0 - root)
 
@@ -155,14 +159,14 @@ def _phong(p: Figures) -> Figures:
 
 
 def _lafortune(p: Figures) -> Figures:
-    """The lobe is divided by max(|Cz|, |Cxy|)^n."""
+    """Convert a Lafortune lobe, which is divided by max(|Cz|, |Cxy|)^n."""
     largest = max(abs(p["Cz"]), abs(p["Cxy"]))
     cxy, cz = p["Cxy"] / largest, p["Cz"] / largest
     return {"specular": p["albedo"], "cx": cxy, "cy": cxy, "cz": cz, "exponent": p["sharpness"]}
 
 
 def _ngan_cook_torrance(p: Figures) -> Figures:
-    """D contains 1 / pi and is divided by pi again; `eta` is F0 of Schlick's formula."""
+    """Convert a Cook-Torrance lobe, whose D contains 1 / pi and is divided by pi again; `eta` is F0 for Schlick."""
     values = {"alpha": p["roughness"], "eta": _index(p["eta"]), "fresnel": "schlick"}
     return {"specular": _times(p["albedo"], 1.0 / math.pi), **values}
 
@@ -173,13 +177,13 @@ def _ngan_ashikhmin_shirley(p: Figures) -> Figures:
 
 
 def _he(p: Figures) -> Figures:
-    """Lengths are converted to micrometers."""
+    """Convert a He lobe; lengths are converted to micrometers."""
     lengths = {"sigma": 1000.0 * p["roughness"], "tau": 1000.0 * p["autocorrelation"]}
     return {"specular": p["albedo"], **lengths, "eta": p["eta"]}
 
 
 def _low_ashikhmin_shirley(p: Figures) -> Figures:
-    """`fresnelReflectance` is the index, for the exact equations."""
+    """Convert an Ashikhmin-Shirley lobe, where `fresnelReflectance` is the index for the exact Fresnel equations."""
     values = {"exponent": p["sharpness"], "eta": p["fresnelReflectance"], "fresnel": "exact"}
     return {"specular": p["albedo"], **values}
 
@@ -193,7 +197,7 @@ def _abc(p: Figures) -> Figures:
 
 
 def _shifted_gamma(p: Figures) -> Figures:
-    """`eta` is the pair F0, F1; c = reach^-k."""
+    """Convert a shifted gamma lobe, where `eta` is the pair F0, F1, and c = reach^-k."""
     f0, f1 = p["eta"]
     return {
         "specular": p["albedo"],

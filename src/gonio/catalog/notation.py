@@ -1,20 +1,20 @@
-"""Materials as text: the command line's notation of a material with its parameters, including nested materials.
+"""The notation of materials on the command line: a material as text, with parameters and nested materials.
 
-    conductor                                   its name; parameters follow as NAME=VALUE
-    ward.py:Ward                                a class in a Python file, which is run because the user named it
+    conductor                                   the name of a model
+    ward.py:Ward                                a class in a Python file, which is run because the user has named it
     gold.binary                                 a file of measured values
-    chest.gltf:Wood                             a material of a glTF file, numbers only (`documents`)
-    gold.json                                   a result of `gonio fit`, or JSON as below
+    chest.gltf:Wood                             a material of a glTF file, without its images (`documents`)
+    gold.json                                   a result of `gonio fit`, or a material as JSON
     lambert+ggx                                 a sum; ggx and beckmann are lobes with Schlick's Fresnel term
-    alum-bronze                                 a material of the library (`gonio models --library`), by its default fit
-    alum-bronze:low2012/lowsmooth_E2            the same material by another published fit
-    conductor(alpha=0.3,preset=Au)              all in one; a comma separates where a name and = follow
-    kulla-conty(base=conductor,base.alpha=0.3)  a value of an inner material, by its path; in any order
-    gold.json(k=0)                              a value by its name, if only one inner material has it: b.k of a sum
-    {"type": "conductor", "alpha": [0.1, 0.4]}  as in a scene
+    alum-bronze                                 a material of the library (`gonio models --library`), default fit
+    alum-bronze:low2012/lowsmooth_E2            the same material with another published fit
+    conductor(alpha=0.3,preset=Au)              a model with parameters; a comma before NAME= separates parameters
+    kulla-conty(base=conductor,base.alpha=0.3)  a parameter of a nested material, by its path; the order is arbitrary
+    gold.json(k=0)                              a parameter by its name, if only one nested material has it
+    {"type": "conductor", "alpha": [0.1, 0.4]}  JSON, as in a scene
 
-Values are numbers, "0.9,0.8,0.7" or [0.9, 0.8, 0.7] for several, names, true or false, and materials. The default inner
-material is metal of alpha 0.3, and for the first of a mix Lambert's.
+Values are numbers, several numbers ("0.9,0.8,0.7" or [0.9, 0.8, 0.7]), names, true or false, and materials. The default
+nested material is a metal with alpha = 0.3; the default first material of a mix is Lambertian.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from ..optics.indices import DispersiveIndex
 from . import documents, outside, texts
 from .texts import apart, assignment, class_named, split, taken_apart
 
-Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class and its settings: texts, or JSON values
-SHOWN = 1000  # numbers of an array that are written
+Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class and its settings, strings or JSON values
+SHOWN = 1000  # maximum number of array entries that are written
 
 __all__ = [
     "Settings", "apart", "as_json", "assignment", "build", "changed", "class_named", "for_files", "from_json", "made",
@@ -49,12 +49,12 @@ __all__ = [
 def named(
     text: str, assignments: Sequence[str] = (), preset: str = "", allow_code: bool = False
 ) -> tuple[BSDF, dict[str, object]]:
-    """A material as the command line names it, and its settings: values by parameter, "preset" among them.
+    """The material named by a string of the command line, and its settings: values by parameter, including "preset".
 
-    assignments  "name=value" each
+    assignments  further settings, each in the form "name=value"
     preset       name of a preset of the material; "" for none
-    allow_code   let a data file name classes in Python files, which are then run
-    Raises InputError, with the closest known spelling, for unknown names and values out of range.
+    allow_code   whether a data file may name classes in Python files, which are then run
+    Raises InputError for unknown names, with the closest known name, and for values out of range.
     """
     cls, own = taken_apart(text, allow_code=allow_code)
     given = {**own, **dict(map(assignment, assignments))}
@@ -63,12 +63,12 @@ def named(
 
 
 def several(texts: Sequence[str], assignments: Sequence[str], nested: bool = True) -> list[Settings]:
-    """The class and settings of each material: its own settings, and all shared settings that apply to the class.
+    """The class and settings of each material: its own settings, and the shared settings that apply to it.
 
     texts        the materials, as on the command line
-    assignments  "name=value" each, shared by all
+    assignments  the shared settings, each in the form "name=value"
     nested       as in `shared`
-    Raises InputError for a shared setting that applies to no material.
+    Raises InputError for a shared setting that applies to none of the materials.
     """
     named = [taken_apart(text) for text in texts]
     return [
@@ -77,10 +77,10 @@ def several(texts: Sequence[str], assignments: Sequence[str], nested: bool = Tru
 
 
 def shared(named: Sequence[Settings], assignments: Sequence[str], nested: bool = True) -> list[dict[str, str]]:
-    """For each material, the shared settings that apply to it.
+    """The shared settings that apply to each material.
 
-    assignments  the shared settings, "name=value" each
-    nested       whether a setting also applies to a material of which an inner one has the parameter
+    assignments  the shared settings, each in the form "name=value"
+    nested       whether a setting also applies to a material if only a nested material has the parameter
     Raises InputError for a setting that applies to none of the materials.
     """
     wanted = dict(map(assignment, assignments))
@@ -96,12 +96,12 @@ def shared(named: Sequence[Settings], assignments: Sequence[str], nested: bool =
 
 
 def build(named: Settings) -> BSDF:
-    """The material of a class and settings, tested. Raises InputError as `named` does."""
+    """Build a material from its class and settings, and test it. Raises InputError as `named` does."""
     return outside.probe(made(*named)[0])
 
 
 def _has(cls: type[BSDF], given: Mapping[str, object], path: str) -> bool:
-    """Whether a material of a class has a parameter, by its path; `given` are its settings, as for `made`."""
+    """Whether a material of a class has a parameter with the given path; `given` are its settings, as for `made`."""
     name, dot, rest = path.partition(".")
     parameter = cls.parameters().get(_own_name(cls.parameters(), name))
     if name in WIDTHS and parameter is None and "alpha" in cls.parameters():
@@ -116,8 +116,10 @@ def _has(cls: type[BSDF], given: Mapping[str, object], path: str) -> bool:
 
 
 def _inside(cls: type[BSDF], given: Mapping[str, object], name: str) -> list[str]:
-    """The paths of the parameters of that name in the inner materials of a class; `given` as for `made`. A parameter
-    hides those of the same name inside its material."""
+    """The paths of all parameters with a given name in the nested materials of a class; `given` as for `made`.
+
+    A parameter of a nested material hides those of the same name in the materials nested in it.
+    """
     paths: list[str] = []
     for key, parameter in cls.parameters().items() if "." not in name else ():
         if parameter.inner:
@@ -128,7 +130,7 @@ def _inside(cls: type[BSDF], given: Mapping[str, object], name: str) -> list[str
 
 
 def _one_of(owner: str, paths: Sequence[str], name: str) -> str:
-    """The only path; "" if there is none. Raises InputError for several."""
+    """The only path; "" if there is none. Raises InputError if there are several."""
     if len(paths) > 1:
         what = f"'{name}' of {owner} is ambiguous: {' and '.join(paths)}"
         raise InputError(what, f"--param {name}", f"give one of them, such as --param {paths[0]}=...")
@@ -136,8 +138,10 @@ def _one_of(owner: str, paths: Sequence[str], name: str) -> str:
 
 
 def path_of(material: BSDF, name: str) -> str:
-    """The path of a parameter given by its path, or by its name if only one inner material has it; `name` itself if
-    there is no such parameter. Raises InputError if several inner materials have it."""
+    """The path of a parameter that is given by its path, or by its name if only one nested material has it.
+
+    Returns `name` itself if there is no such parameter. Raises InputError if several nested materials have it.
+    """
     if "." in name or name in material.parameters():
         return name
     here = {key: getattr(material, key) for key, parameter in material.parameters().items() if parameter.inner}
@@ -145,9 +149,10 @@ def path_of(material: BSDF, name: str) -> str:
 
 
 def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, object]]:
-    """`named` for a class and its values, each a string or another JSON value.
+    """The result of `named` for a class and its values, which are strings or other JSON values.
 
-    A value of the inner material `base` has the key "base.alpha" and overrides the one that `base` itself states.
+    The key "base.alpha" denotes a parameter of the nested material `base`, and overrides a value given in `base`
+    itself.
     """
     known = cls.parameters()
     values: dict[str, object] = {}
@@ -173,18 +178,20 @@ def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, 
         return cls(**values), values
     except InputError:
         raise
-    except Exception as error:  # raised in a user's class
+    except Exception as error:  # raised by a user's class
         raise InputError(f"{cls.__name__} cannot be constructed: {type(error).__name__}: {error}", "TARGET") from None
 
 
 def _own_name(known: Mapping[str, Parameter], name: str) -> str:
-    """The name of a parameter, with the underscore that it has if materials have a member of that name."""
+    """The name of a parameter, including the underscore that it has if materials have a member with this name."""
     return f"{name}_" if name not in known and f"{name}_" in known else name
 
 
 def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, object], dict[str, dict[str, object]]]:
-    """The settings of a material itself, and of each inner material, by parameter. Raises InputError for unknown
-    names."""
+    """The settings of a material itself, and those of each nested material, by parameter.
+
+    Raises InputError for unknown names.
+    """
     known = cls.parameters()
     given = with_pair(known, {_own_name(known, name): value for name, value in given.items()}, "--param")
     own: dict[str, object] = {}
@@ -208,7 +215,7 @@ def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, o
 
 
 def typed(parameter: Parameter, value: Value) -> object:
-    """A parameter's value from a string, or from another JSON value."""
+    """Convert a string or another JSON value to the value of a parameter."""
     where = f"--param {parameter.name}"
     if parameter.inner:
         return _inner(value, where, {})
@@ -216,7 +223,7 @@ def typed(parameter: Parameter, value: Value) -> object:
         return value
     if parameter.kind == "choice":
         name = value.strip().strip('"') if isinstance(value, str) else value
-        # a user's distribution or masking term
+        # the distribution or masking term of a user
         family = getattr(parameter, "family", None)
         return outside.member(name, None, where, family) if isinstance(name, str) and outside.names_code(name) else name
     if parameter.kind == "flag":
@@ -226,7 +233,7 @@ def typed(parameter: Parameter, value: Value) -> object:
     if isinstance(parameter, IndexParameter) and isinstance(value, str) and value.strip(' "')[:1].isalpha():
         return parameter.coerce(value.strip(' "'), where)
     if isinstance(value, np.ndarray | DispersiveIndex) or backend.is_drjit(value):
-        return value  # one value per ray, or a curve, as given by a program
+        return value  # one value per ray, or a curve, which only programs can give
     try:
         parts = value.strip(" []()").split(",") if isinstance(value, str) else value
         numbers = [float(part) for part in (parts if isinstance(parts, list | tuple) else [parts])]
@@ -236,8 +243,11 @@ def typed(parameter: Parameter, value: Value) -> object:
 
 
 def written(value: Value) -> str:
-    """A value in the form that `typed` accepts: a material with its non-default parameters, but only the shape of an
-    array with one value per ray."""
+    """A value as a string that `typed` accepts.
+
+    A material is written with its non-default parameters. Of an array with one value per ray, only the shape is
+    written.
+    """
     if isinstance(value, BSDF):
         inner = ",".join(f"{name}={setting(value, name, v)}" for name, v in settings(value).items())
         return f"{spelled(type(value))}({inner})" if inner else spelled(type(value))
@@ -256,8 +266,10 @@ def written(value: Value) -> str:
 
 
 def setting(material: object, path: str, value: Value) -> str:
-    """The value of a material's parameter in a form that `typed` accepts in any process: as `written`, but FILE.py:NAME
-    for a distribution or another member that only this program knows.
+    """The value of a material's parameter as a string that `typed` accepts in any process.
+
+    It is that of `written`, but FILE.py:NAME for a distribution or another member that only this program has
+    registered.
 
     path  path of the parameter, such as "alpha" or "base.ndf"
     """
@@ -268,9 +280,9 @@ def setting(material: object, path: str, value: Value) -> str:
 
 
 def as_json(material: BSDF) -> dict[str, object]:
-    """The material as JSON, without rounding: {"type": "conductor", "alpha": 0.3}; `made` accepts the values. File
-    paths are absolute, since a reader may run in another folder.
+    """The material as JSON, without rounding, such as {"type": "conductor", "alpha": 0.3}; `made` accepts the values.
 
+    File paths are absolute, because the JSON may be read in another folder.
     Raises InputError for a class without a file, and for values that JSON cannot express.
     """
     notation: dict[str, object] = {"type": spelled(type(material))}
@@ -298,7 +310,7 @@ def as_json(material: BSDF) -> dict[str, object]:
 
 
 def for_files(material: BSDF) -> dict[str, object] | None:
-    """The material as result files store it, with the type names of scene files; None if no file can express it."""
+    """The material as JSON for result files, with the type names of scene files; None if it cannot be expressed."""
     try:
         return documents.for_scenes(as_json(material))
     except InputError:
@@ -306,7 +318,7 @@ def for_files(material: BSDF) -> dict[str, object] | None:
 
 
 def from_json(described: Mapping[str, object]) -> BSDF:
-    """The material that `as_json` describes. Raises InputError for anything else."""
+    """The material from the result of `as_json`. Raises InputError for other values."""
     if not isinstance(described, Mapping) or "type" not in described:
         raise InputError(f"{described!r:.60} does not describe a material", "material", 'such as {"type": "conductor"}')
     fields = dict(described)
@@ -314,7 +326,7 @@ def from_json(described: Mapping[str, object]) -> BSDF:
 
 
 def settings(material: BSDF) -> dict[str, Value]:
-    """The non-default parameters, by name."""
+    """The non-default parameters of a material, by name."""
     values = {}
     for name, parameter in material.parameters().items():
         value = getattr(material, name)
@@ -333,7 +345,7 @@ def _same(a: object, b: object) -> bool:
 
 
 def _inner(value: Value, where: str, below: Mapping[str, object]) -> BSDF:
-    """The material that a string or JSON names, with additional settings."""
+    """The nested material that a string or JSON describes, with additional settings."""
     if isinstance(value, BSDF):
         return (
             value
@@ -349,14 +361,14 @@ def _inner(value: Value, where: str, below: Mapping[str, object]) -> BSDF:
 
 
 def _inner_default(parameter: Parameter) -> Value:
-    """The default material of a parameter."""
+    """The default nested material of a parameter."""
     if not parameter.required:
         return parameter.default
     return "lambert" if parameter.name == "a" else "conductor(alpha=0.3)"
 
 
 def _typed_at(material: BSDF, path: str, value: Value) -> object:
-    """A value for the parameter at a path. Raises InputError if there is none."""
+    """Convert a value for the parameter at a path. Raises InputError if there is no such parameter."""
     name, dot, rest = path.partition(".")
     parameter = material.parameters().get(name)
     if parameter is None or (dot and not parameter.inner):
@@ -366,13 +378,15 @@ def _typed_at(material: BSDF, path: str, value: Value) -> object:
 
 
 def changed(material: BSDF, values: Mapping[str, object]) -> BSDF:
-    """The material with some values replaced, by path: strings or other JSON values. Raises InputError for invalid
-    ones."""
+    """The material with some parameters replaced. Raises InputError for invalid values.
+
+    values  strings or other JSON values, by the path of the parameter
+    """
     return _inner(material, "material", values)
 
 
 def spelled(cls: type[BSDF]) -> str:
-    """The string that names a class: a material's name, FILE.py:CLASS, or the file of a shader."""
+    """The string that names a class: the name of a material, FILE.py:CLASS, or the file of a shader."""
     if cls.spelling:
         return cls.spelling
     if BSDF.family.all().get(cls.name) is cls:

@@ -1,10 +1,10 @@
-"""The kind of thing that a word of the command line names, a material, a scene, an image, ..., for all verbs.
+"""Determine what an operand of the command line names: a material, a scene, a picture and so on.
 
     kind_of("examples/phong", {Kind.SCENE, *MATERIALS}, "SCENE")     Kind.SCENE
 
-A word may have several readings: `phong` is a material, and a folder of that name may contain a scene. The readings are
-ordered, existing files before plain names, and the first that the verb accepts is chosen. Only names, suffixes and file
-contents matter: no code is run, and names of any length are accepted.
+An operand may be ambiguous: `phong` is a material, but a folder of this name may contain a scene. The possible kinds
+are ordered, existing files before names, and the first kind that the command accepts is used. They are determined only
+from names, suffixes and file contents. No code is run, and names of any length are accepted.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from . import documents, library, outside, texts
 
 PICTURE_SUFFIXES = (".exr", ".hdr", ".png", ".npz")
 SCENE_FILE = "scene.json"
-CALIBRATION = "calibration.json"  # in a folder of photographs
-_LONGEST = 80  # characters of a word in an error
-_LARGEST_CALIBRATION = 1 << 20  # bytes; a larger .json is a scene
-_NEAR = 0.75  # similarity from which an unknown word is treated as a misspelled name
+CALIBRATION = "calibration.json"  # name of the calibration file in a folder of photographs
+_LONGEST = 80  # maximum number of characters of an operand in an error
+_LARGEST_CALIBRATION = 1 << 20  # bytes; a larger .json file counts as a scene
+_NEAR = 0.75  # similarity from which an unknown operand is treated as a misspelled name
 
 
 class Kind(enum.Enum):
-    """The kinds of things that a word may name."""
+    """The kinds of operands."""
 
     NAME = "a material's name"
     CODE = "a class in a Python file"
@@ -61,14 +61,14 @@ _TAKEN = {
 
 
 def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str) -> Kind:
-    """The kind of a word, which must be one of the accepted kinds.
+    """The kind of an operand, which must be one of the accepted kinds.
 
-    where  name of the operand, "SCENE", for errors
-    Raises InputError, with the actual and the expected kinds, if it has none of these kinds.
+    where  name of the operand in errors, such as "SCENE"
+    Raises InputError, which states the actual and the expected kinds, if the operand is of no accepted kind.
     """
     text = os.fspath(word)
     if Kind.SCENE in accepted and _exists(Path(text.strip()) / SCENE_FILE):
-        return Kind.SCENE  # the first reading of such a folder, so that others need not be determined
+        return Kind.SCENE  # the first possible kind of such a folder, so the others need not be determined
     kinds = readings(text)
     kind = next((one for one in kinds if one in accepted), None)
     if kind is not None:
@@ -89,7 +89,7 @@ def _shortened(text: str) -> str:
 
 
 def _expected(accepted: Collection[Kind]) -> str:
-    """A description of the kinds."""
+    """A description of the accepted kinds for an error."""
     any_material = set(accepted) >= MATERIALS
     named = [kind.value for kind in Kind if kind in accepted and not (any_material and kind in MATERIALS)]
     *others, last = ["a material", *named] if any_material else named
@@ -97,7 +97,7 @@ def _expected(accepted: Collection[Kind]) -> str:
 
 
 def is_material(word: str) -> bool:
-    """Whether a word names an existing material: a known name, a file, or a material class."""
+    """Whether an operand names an existing material: a known name, a file, or a material class."""
     kinds = readings(word)
     if kinds[0] is Kind.CODE:
         cls = outside.thing(texts.split(word)[0], where="MODEL")
@@ -108,8 +108,10 @@ def is_material(word: str) -> bool:
 
 
 def readings(text: str) -> list[Kind]:
-    """All readings of a word, at least one, the most likely first. Raises InputError for a Python file without a
-    class."""
+    """All possible kinds of an operand, at least one; the most likely kind is first.
+
+    Raises InputError for a Python file without a class.
+    """
     text = text.strip()
     if texts.summands(text):
         return [Kind.NAME]
@@ -143,8 +145,11 @@ def readings(text: str) -> list[Kind]:
 
 
 def _described(name: str, kind: Kind) -> list[Kind]:
-    """The readings of a description by its type: Gonio's, or a Mitsuba plugin's. Names that the two share are Gonio's;
-    `twosided` and `thindielectric`, which other verbs read as two-sided and thin-dielectric, are plugins."""
+    """The possible kinds of a description from its type, which is one of Gonio's or a Mitsuba plugin.
+
+    Names that exist in both are Gonio's. `twosided` and `thindielectric`, which other commands interpret as two-sided
+    and thin-dielectric, are plugins.
+    """
     known = (
         re.sub("^gonio-", "", name) in models()
         or library.knows(name)
@@ -164,7 +169,7 @@ def _type_of(text: str) -> str:
 
 
 def _type_of_file(text: str) -> str:
-    """The type of a description in a .json, "" of other documents."""
+    """The type of the description in a .json file; "" for other documents."""
     path = Path(os.path.expanduser(text))
     try:
         return _type_of(path.read_text(encoding="utf-8")) if path.suffix.lower() == ".json" else ""
@@ -173,13 +178,13 @@ def _type_of_file(text: str) -> str:
 
 
 def _names(name: str) -> list[Kind]:
-    """The readings of a plain name."""
+    """The possible kinds of a name."""
     kinds = [Kind.NAME] if is_model(name) or library.knows(name) else []
     return [Kind.DISTRIBUTION, *kinds] if name in distributions() else kinds
 
 
 def _resembles(name: str) -> bool:
-    """Whether a name is similar to that of a material or a distribution."""
+    """Whether a name is similar to the name of a material or a distribution."""
     if os.sep in name or not name:
         return False
     known = [*models(), *library.materials(), *distributions()]
@@ -187,14 +192,14 @@ def _resembles(name: str) -> bool:
 
 
 def _in_folder(path: Path, names: list[Kind]) -> list[Kind]:
-    """The readings of a folder by its files; for one without known files the verb reports the error."""
+    """The possible kinds of a folder from its files. If it contains no known files, the command reports the error."""
     marks = {SCENE_FILE: Kind.SCENE, "tables.npz": Kind.TABLES, CALIBRATION: Kind.CALIBRATION}
     kinds = [kind for name, kind in marks.items() if _exists(path / name)]
     return [*kinds, Kind.FOLDER, *names] if kinds else [Kind.FOLDER, *names, Kind.SCENE, Kind.TABLES]
 
 
 def _of_file(path: Path) -> list[Kind]:
-    """The readings of a file by its suffix, whether it exists or not; empty if the suffix is unknown."""
+    """The possible kinds of a file, which need not exist, from its suffix; empty if the suffix is unknown."""
     suffix = path.suffix.lower()
     if suffix == ".npz":
         return _of_archive(path)
@@ -206,7 +211,7 @@ def _of_file(path: Path) -> list[Kind]:
 
 
 def _of_archive(path: Path) -> list[Kind]:
-    """The readings of an archive, baked tables, networks of several materials or an image, by its array names."""
+    """The possible kinds of an archive, from array names: baked tables, networks of several materials, or a picture."""
     try:
         with zipfile.ZipFile(path) as file:
             names = file.namelist()
@@ -218,7 +223,7 @@ def _of_archive(path: Path) -> list[Kind]:
 
 
 def _lists_photographs(path: Path) -> bool:
-    """Whether a .json is a calibration."""
+    """Whether a .json file is a calibration file."""
     try:
         content = json.loads(path.read_bytes()) if path.stat().st_size <= _LARGEST_CALIBRATION else None
     except (OSError, ValueError, RecursionError):
@@ -227,7 +232,7 @@ def _lists_photographs(path: Path) -> bool:
 
 
 def _broken(path: Path) -> str:
-    """The error in a .json that cannot be parsed; "" if it can, or for other files."""
+    """The error in a .json file that cannot be parsed; "" if it can be parsed, and for other files."""
     if path.suffix.lower() != ".json" or not _exists(path):
         return ""
     try:
@@ -238,7 +243,7 @@ def _broken(path: Path) -> str:
 
 
 def _may_be_a_path(path: Path) -> bool:
-    """Whether a file could have that name: it is not too long and contains no zero byte."""
+    """Whether a file could have this name, that is, whether it is not too long and contains no zero byte."""
     try:
         os.stat(path)
     except ValueError:
@@ -251,7 +256,7 @@ def _may_be_a_path(path: Path) -> bool:
 def _exists(path: Path) -> bool:
     try:
         return path.exists()
-    except (OSError, ValueError):  # too long, or a zero byte
+    except (OSError, ValueError):  # the name is too long or contains a zero byte
         return False
 
 

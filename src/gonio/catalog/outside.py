@@ -1,7 +1,7 @@
-"""Materials in user files: FILE.py:CLASS, which is code, and data files.
+"""Materials in user files: classes in Python files, FILE.py:CLASS, and data files.
 
-A file runs only if the user named it, or allowed a scene to name it: `load` is called for operands of the command line
-and programs, and by the reader of scenes for which code is allowed.
+A Python file is run only if the user has named it or has allowed a scene to name it: `load` is called for operands of
+the command line and of programs, and by the reader of scenes for which code is allowed.
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ __all__ = [
 
 
 def reader_of(text: str) -> type[BSDF] | None:
-    """The material class of a data file, by its name: Measured for "gold.binary"; None if there is none."""
+    """The material class for a data file, from its name, such as Measured for "gold.binary"; None if there is none."""
     return next((cls for cls in BSDF.family.all().values() if cls.reads(text)), None)
 
 
 def names_data(text: str) -> bool:
-    """Whether a string names a file that is a material by itself: measured values, or a shader."""
+    """Whether a string names a data file that is a material: measured values or a shader."""
     return shaders.names_shader(text) or reader_of(text) is not None
 
 
 def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BSDF]:
-    """The material class that FILE.py:CLASS names; the file is run once per saved version.
+    """The material class named by FILE.py:CLASS. The file is run once per saved version.
 
-    folder  the base of a relative path; None: the current folder
+    folder  the base of a relative path; None for the current folder
     where   the location that errors name
     Raises InputError, with file and line, if the file cannot be run or has no such class.
     """
@@ -61,7 +61,7 @@ def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BS
 
 
 def as_material(cls: object) -> type[BSDF]:
-    """A class as a material class. Raises InputError if it cannot be one."""
+    """Convert a class to a material class. Raises InputError if this is not possible."""
     place = place_of(cls)
     family = getattr(cls, "family", BSDF.family)
     if family is not BSDF.family or not isinstance(cls, type):
@@ -83,14 +83,16 @@ def as_material(cls: object) -> type[BSDF]:
 
 
 def is_plugin(cls: object) -> bool:
-    """Whether a class is derived from Mitsuba's BSDF, of any variant; does not load Mitsuba."""
+    """Whether a class derives from Mitsuba's BSDF in any variant. Does not load Mitsuba."""
     bases = cls.__mro__ if isinstance(cls, type) else ()
     return any(base.__name__ == "BSDF" and base.__module__.startswith("mitsuba") for base in bases)
 
 
 def adopt(thing: object, where: str = "") -> type[BSDF]:
-    """A material class for a class with `eval` that is not a gonio.BSDF, or for an instance of one: `pdf` and `sample`
-    use a guide computed from `eval`. Errors name `where`."""
+    """A material class for a class with `eval` that does not derive from gonio.BSDF, or for an instance of it.
+
+    `pdf` and `sample` use a guide that is computed from `eval`. Errors name `where`.
+    """
     cls = thing if isinstance(thing, type) else type(thing)
     if not callable(getattr(cls, "eval", None)):
         raise InputError(f"{cls.__name__} has no eval", where, "write eval(self, wo, wi): f |cos theta_i|")
@@ -126,9 +128,11 @@ def _forward(inner: object, name: str) -> Callable[..., object]:
 
 @exclusive
 def probe(material: BSDF) -> BSDF:
-    """Test a material's formulas on two directions, before they fail deep inside a render, and return the material.
+    """Test the formulas of a material for two directions, so that they do not fail later in a render; return the
+    material.
 
-    Raises InputError, with file and line, if a formula raises, uses Python's `if` on a value, or returns a wrong type.
+    Raises InputError, with file and line, if a formula raises an exception, uses `if` on a value, or returns a wrong
+    type.
     """
     if any(is_outside(type(inner)) for _, inner in tree.walk(material)):
         _try(material)
@@ -137,10 +141,10 @@ def probe(material: BSDF) -> BSDF:
 
 @exclusive
 def check_operators(material: BSDF) -> BSDF:
-    """Return the material itself. Raises InputError, with file and line, if a user's formula uses `**` on a value.
+    """Return the material. Raises InputError, with file and line, if a user's formula applies `**` to a value.
 
-    Formulas are recorded only if their file contains the operator: the verifier runs all others, including those that
-    do not terminate, under its own supervision.
+    A formula is recorded only if its file contains this operator. The verifier runs all other formulas in a supervised
+    process, because they may not terminate.
     """
     classes = {type(inner) for _, inner in tree.walk(material)}
     files = [_file_of(cls) for cls in classes if not cls.__module__.startswith("gonio.")]
@@ -153,14 +157,14 @@ def check_operators(material: BSDF) -> BSDF:
             if "`**`" in error.what:
                 raise InputError(error.what, error.where, error.hint) from error
         except Exception:
-            continue  # a law reports it
+            continue  # the verifier reports it
     return material
 
 
 def _file_of(cls: type) -> str:
     try:
         return inspect.getsourcefile(cls) or ""
-    except (OSError, TypeError):  # defined at a prompt
+    except (OSError, TypeError):  # defined at an interactive prompt
         return ""
 
 
@@ -170,7 +174,7 @@ U = np.array([[0.3, 0.7, 0.2], [0.8, 0.1, 0.6]])
 
 
 def _try(material: BSDF) -> None:
-    """Test by recording, which compiles nothing, or by running, if Dr.Jit is used directly and prevents a recording."""
+    """Test the formulas by recording them, or by running them if direct use of Dr.Jit prevents recording."""
     path = Path(inspect.getsourcefile(inspect.unwrap(type(material).eval)) or "")
     for formula in ("eval", "pdf", "sample"):
         if material.stochastic or not _recorded(material, formula, path):
@@ -178,11 +182,11 @@ def _try(material: BSDF) -> None:
 
 
 def _recorded(material: BSDF, formula: str, path: Path) -> bool:
-    """Whether a formula can be recorded; if so, the types of its result are checked."""
+    """Whether a formula can be recorded. If so, the types of its result are checked."""
     try:
         result = material.record(formula).entry.result
     except RecordingError as error:
-        if isinstance(error, ForbiddenOperator):  # with a single ray it would run unnoticed
+        if isinstance(error, ForbiddenOperator):  # for a single ray, it would run without an error
             raise InputError(error.what, error.where, error.hint) from error
         return False
     except Exception:

@@ -1,4 +1,4 @@
-"""Parse a material's string: its name and its settings.
+"""Parse the string of a material into its name and its settings.
 
     taken_apart("conductor(alpha=0.3,preset=Au)")    (Conductor, {"alpha": "0.3", "preset": "Au"})
     taken_apart("lambert+ggx")                       (Sum, {"a": "lambert", "b": "conductor(fresnel=schlick,...)"})
@@ -19,20 +19,20 @@ from ..material.parameters import Value
 from ..optics.ndf import distributions
 from . import documents, library, outside, shaders
 
-# lobes as parts of a sum, "lambert+ggx": Schlick's Fresnel term of an index without absorption
+# lobes that can be terms of a sum, as in "lambert+ggx": Schlick's Fresnel term, with an index without absorption
 LOBES = {
     "ggx": "conductor(fresnel=schlick,eta=1.5,k=0)",
     "beckmann": "conductor(fresnel=schlick,eta=1.5,k=0,ndf=beckmann)",
 }
 SHADER = "shader"  # the type of shaders in scenes and JSON: {"type": "shader", "file": "my.glsl"}
-RANGE_STEPS = 5  # values of a range
+RANGE_STEPS = 5  # number of values in a range
 _RANGE = re.compile(r"(.+?)\.\.(.+)", re.DOTALL)
 _CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
-_SETTINGS = re.compile(r"\(\s*[\w.]+\s*=.*\)\s*\Z", re.DOTALL)  # at the end of a text
+_SETTINGS = re.compile(r"\(\s*[\w.]+\s*=.*\)\s*\Z", re.DOTALL)  # settings at the end of a string
 
 
 def assignment(text: str, option: str = "--param") -> tuple[str, str]:
-    """("alpha", "0.3") for "alpha=0.3"."""
+    """Split "alpha=0.3" into ("alpha", "0.3")."""
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
         raise InputError(f"'{text}' given, NAME=VALUE expected", option, "such as alpha=0.3")
@@ -40,12 +40,13 @@ def assignment(text: str, option: str = "--param") -> tuple[str, str]:
 
 
 def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tuple[type[BSDF], dict[str, object]]:
-    """The class and the settings of NAME, FILE or NAME(parameter=value,...): strings, or JSON values for a document's
-    material and for JSON.
+    """The class and the settings of a material given as NAME, FILE or NAME(parameter=value,...).
+
+    The settings are strings, or JSON values if the material is given by a document or as JSON.
 
     where       the location that errors name
-    allow_code  let a document name classes in Python files
-    Raises InputError if it is not a material, and for a document that names code without permission.
+    allow_code  whether a document may name classes in Python files
+    Raises InputError if the string does not name a material, and for a document that names code without permission.
     """
     if text.count("(") + text.count("{") > tree.MAX_MATERIALS:
         raise InputError(f"more than {tree.MAX_MATERIALS} nested materials", where, "mix fewer materials")
@@ -56,7 +57,7 @@ def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tu
     if head.startswith("{"):
         cls, own = apart(_json(head, where), where)
         return cls, {**own, **given}
-    if documents.names_document(head):  # before tables, since the name of a material in a document may look like one
+    if documents.names_document(head):  # before tables, whose names the name of a material in a document may resemble
         described = documents.without_pictures(head)
         _refuse_code(described, head, allow_code)
         cls = class_named(str(described.pop("type")), where)
@@ -73,8 +74,10 @@ def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tu
 
 
 def split(text: str) -> tuple[str, str]:
-    """Name and settings of NAME(parameter=value,...): ("conductor", "alpha=0.3"); the settings are "" if there are
-    none. File names and JSON may contain brackets."""
+    """Split NAME(parameter=value,...) into the name and the settings, such as ("conductor", "alpha=0.3").
+
+    The settings are "" if there are none. File names and JSON may contain brackets.
+    """
     text = text.strip()
     if summands(text):
         return text, ""
@@ -97,8 +100,7 @@ def split(text: str) -> tuple[str, str]:
 
 
 def terms(text: str) -> list[str]:
-    """The parts of a string between the signs of a sum, "lambert+ggx". A + inside brackets or in a file name does not
-    separate parts."""
+    """The terms of a sum such as "lambert+ggx". A plus sign in brackets or in a file name does not separate terms."""
     if documents.names_document(text) or outside.names_data(text):
         return [text.strip()]
     parts, depth = [""], 0
@@ -112,7 +114,7 @@ def terms(text: str) -> list[str]:
 
 
 def summands(text: str) -> list[str]:
-    """The parts of a sum of materials, with the lobes of `LOBES` written out; empty for other strings."""
+    """The terms of a sum of materials, in which the lobes of `LOBES` are expanded; empty for other strings."""
     parts = terms(text)
     if len(parts) < 2 or not all(parts):
         return []
@@ -120,13 +122,13 @@ def summands(text: str) -> list[str]:
 
 
 def as_call(text: str) -> str:
-    """A sum in a form to which settings can be added, "sum(a=lambert,b=...)"; any other string unchanged."""
+    """A sum in the form "sum(a=lambert,b=...)", to which settings can be added; other strings are not changed."""
     parts = summands(text)
     return f"sum(a={as_call('+'.join(parts[:-1]))},b={parts[-1]})" if parts else text
 
 
 def expanded(part: str) -> str:
-    """A part of a sum with its lobe written out: "ggx(alpha=0.2)" as a conductor of alpha 0.2."""
+    """A term of a sum, in which a lobe is expanded: "ggx(alpha=0.2)" becomes a conductor with alpha = 0.2."""
     head, bracket, rest = part.partition("(")
     if head.strip() not in LOBES:
         return part
@@ -152,7 +154,7 @@ def assignments(inside: str, where: str = "MODEL") -> dict[str, str]:
 
 
 def _with_zeros(text: str) -> str:
-    """JSON with leading zeros added: 0.3 for `.3`."""
+    """Add leading zeros to the numbers in JSON, such as 0.3 for `.3`."""
     return re.sub(r"(?<![\w.])\.(?=\d)", "0.", text)
 
 
@@ -164,7 +166,7 @@ def _json(text: str, where: str) -> Value:
 
 
 def _refuse_code(described: documents.Notation, file: str, allowed: bool) -> None:
-    """Raise InputError if a file's description names a class in a Python file."""
+    """Raise InputError if the description in a file names a class in a Python file."""
     code = next(_code_in(described), None)
     if code is not None and not allowed:
         hint = f"read that file first; then name the material itself: '{as_text(described)}'"
@@ -180,7 +182,7 @@ def _code_in(described: Mapping[str, object]) -> Iterator[str]:
 
 
 def _parts(text: str) -> list[str]:
-    """The parts between commas outside brackets where a name and = follow; any other comma is part of a color."""
+    """The settings in a string: those commas outside brackets separate that NAME= follows; others belong to colors."""
     parts, depth, start = [], 0, 0
     for at, letter in enumerate(text):
         depth += (letter in "([{") - (letter in ")]}")
@@ -199,14 +201,14 @@ def _no_material(value: object, where: str) -> InputError:
 
 
 def class_named(name: str, where: str = "MODEL") -> type[BSDF]:
-    """The class of a name, or of FILE.py:CLASS; errors name `where`."""
+    """The class with a given name, or given as FILE.py:CLASS; errors name `where`."""
     return class_and_preset(name, where)[0]
 
 
 def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
-    """The class of a name, of FILE.py:CLASS or of a library material, with its preset; "" for none.
+    """The class of a name, of FILE.py:CLASS or of a library material, and the name of its preset, or "".
 
-    Raises InputError, which names `where` and the closest known name, for an unknown name.
+    Raises InputError, which names `where` and the closest known name, if the name is unknown.
     """
     if outside.names_code(name):
         return outside.load(name, where=where), ""
@@ -222,7 +224,7 @@ def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
 
 
 def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
-    """`taken_apart` for a material given as a string or another JSON value; errors name `where`."""
+    """The result of `taken_apart` for a material given as a string or another JSON value; errors name `where`."""
     if isinstance(value, BSDF):
         return type(value), {}
     if isinstance(value, str):
@@ -238,13 +240,13 @@ def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
 
 
 def named_by(fields: dict[str, object]) -> str:
-    """The name of a class, from the "type" of a description and the "file" of a shader, both of which are removed."""
+    """The name of the class of a description, from its "type" and, for a shader, its "file"; both are removed."""
     name = str(fields.pop("type"))
     return str(fields.pop("file")) if name == SHADER and "file" in fields else name
 
 
 def as_text(value: object) -> str:
-    """A JSON value as a string."""
+    """Convert a JSON value to a string."""
     if isinstance(value, Mapping):
         inner = ",".join(f"{name}={as_text(v)}" for name, v in value.items() if name != "type")
         return f"{value.get('type')}({inner})" if inner else str(value.get("type"))
@@ -254,9 +256,10 @@ def as_text(value: object) -> str:
 
 
 def range_of(text: str) -> list[str]:
-    """The five values of "LOW..HIGH", geometric if the range spans a factor of ten or more; empty for any other string.
+    """The five values of a range "LOW..HIGH"; empty for other strings.
 
-    Raises InputError for ends that are not numbers or do not increase.
+    They form a geometric sequence if the range spans a factor of ten or more. Raises InputError if the ends are not
+    numbers or do not increase.
     """
     import numpy as np
 

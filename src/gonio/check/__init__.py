@@ -1,9 +1,9 @@
-"""Checks of a student's own work against Gonio: tables, values of f, classes, pictures and folders of these.
+"""Checks of a student's work against Gonio: tables, values of f, classes, pictures, and folders of such files.
 
     go.check("E.png"); go.check("f.csv", "oren-nayar(sigma=0.3)", up="y"); go.check("submissions", sheet="hw4")
 
-`run` selects the check for each kind of work, `mistakes` and `table_forms` hold the mistakes that can be named, and
-`sheet` the tasks of the courses.
+`run` selects the check for each kind of work, `mistakes` and `table_forms` define the known mistakes, and `sheet`
+defines the tasks of the courses.
 """
 
 from .finding import Finding, Mistake

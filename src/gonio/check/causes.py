@@ -1,4 +1,4 @@
-"""The probable mistake in values of f: a formula of `mistakes`, or a factor that `verify.forensics` finds."""
+"""The probable mistake in values of f: a wrong formula from `mistakes`, or a factor found by `verify.forensics`."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .finding import Mistake
 from .mistakes import FAMILIES, Values, Variant, f_of
 
 TOP, BOTTOM = "your f", "the model's"
-REGION = "the region where the values differ"  # the topic if no formula explains them
+REGION = "the region where the values differ"  # the topic if no formula explains the values
 
 
 def ratio(material: BSDF, wo: np.ndarray, wi: np.ndarray, given: Values, expected: Values, accuracy: float) -> Ratio:
-    """The ratio of the given to the expected values, each (N, 3).
+    """The ratio of the given values to the expected ones, both of shape (N, 3).
 
-    accuracy  relative difference that counts as equal
+    accuracy  relative difference below which values count as equal
     """
 
     def recompute(subject: Subject, wo: np.ndarray, wi: np.ndarray, mode: str) -> np.ndarray:
@@ -34,10 +34,11 @@ def ratio(material: BSDF, wo: np.ndarray, wi: np.ndarray, given: Values, expecte
 
 
 def named(both: Ratio) -> Mistake | None:
-    """The mistake that explains the ratio `both`; None if no formula does.
+    """The mistake that explains the ratio `both`; None if there is no such mistake.
 
-    In order of preference: a known wrong formula that reproduces the values; a factor that `verify.forensics` fits to
-    the ratio; a wrong formula times such a factor; the region where the ratio differs from 1.
+    The explanations are tried in this order: a known wrong formula that reproduces the values; a factor that
+    `verify.forensics` fits to the ratio; a wrong formula multiplied by such a factor; a region where the ratio differs
+    from 1.
     """
     telling = referee.telling(both)
     wrong: list[Variant] = []
@@ -53,26 +54,27 @@ def named(both: Ratio) -> Mistake | None:
     for variant in wrong:
         fit = fits.simple(dataclasses.replace(telling, below=variant.values))
         if fit is not None:
-            words = f"{variant.mistake.words}; besides, a factor of {fit.formula}"
+            words = f"{variant.mistake.words}; in addition, a factor of {fit.formula}"
             return Mistake(words, variant.mistake.topic)
     cause = referee.named(both)
     return Mistake(cause.words, REGION) if cause is not None else None
 
 
 def is_known(mistake: Mistake) -> bool:
-    """Whether a mistake has a formula of its own: neither a region nor a constant that nothing explains, which may as
-    well be that of another parameter."""
+    """Whether a mistake is a specific formula, rather than a region or an unexplained constant factor, which may also
+    be due to a different parameter value."""
     return mistake.topic != REGION and not mistake.words.endswith(f"{fits.ANY}?")
 
 
 def _either(mistakes: list[Mistake]) -> Mistake:
-    """The first three of several mistakes with equal values, such as a factor of 4 and of 1 / alpha = 4, as one."""
+    """The first three of several mistakes with equal values, combined into one: for example, a factor of 4 and a factor
+    of 1 / alpha, if alpha is 1/4."""
     texts = list(dict.fromkeys(mistake.words for mistake in mistakes))[:3]
     return Mistake(", or ".join(texts), " or ".join(dict.fromkeys(mistake.topic for mistake in mistakes[:3])))
 
 
 def _different(both: Ratio, variants: Iterable[Variant]) -> Iterator[Variant]:
-    """The mistakes whose values differ from the right ones in these rows."""
+    """The mistakes whose values differ from the correct values in these rows."""
     for variant in variants:
         if variant.values.shape != both.below.shape:
             variant = Variant(variant.mistake, variant.values[:, : both.below.shape[1]])
@@ -82,13 +84,13 @@ def _different(both: Ratio, variants: Iterable[Variant]) -> Iterator[Variant]:
 
 
 def _equal(both: Ratio, variant: Variant) -> bool:
-    """Whether the given values are those of a mistake, up to negligible ones."""
+    """Whether the given values are those that a mistake produces, except for a negligible fraction of the rows."""
     return bool(close(both.above, variant.values, tolerance(both)).mean() > COVER)
 
 
 def close(a: Values, b: Values, accuracy: float) -> NDArray[np.bool_]:
-    """Whether the rows of two arrays of values agree within a relative accuracy, (N,). Values far below the largest one
-    may differ more."""
+    """Whether each row of two arrays of values agrees to within a relative accuracy, (N,). Values far below the largest
+    value may differ by more."""
     size = np.maximum(np.abs(a), np.abs(b))
     floor = 1e-5 * np.percentile(size, 99.0) if size.size else 0.0
     return np.all(np.abs(a - b) <= accuracy * size + accuracy * floor, axis=1)

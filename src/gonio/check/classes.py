@@ -1,4 +1,5 @@
-"""Compare a class, or any other material, with a model: f at pairs of directions, checked like a file of values."""
+"""Comparison of a class, or any other material, with a model: f at pairs of directions is checked like a file of
+values."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from .finding import Finding
 from .mistakes import Values, f_of
 
 PAIRS = 1024
-ACCURACY = 1e-4  # relative; both materials are evaluated in float64, from constants with perhaps five digits
+ACCURACY = 1e-4  # relative; both materials are evaluated in float64, but constants may have only five digits
 _GRAZING = 0.02  # smallest cosine; beyond 89 degrees, equivalent formulas for the tangent differ numerically
 
 
@@ -23,7 +24,7 @@ def check(name: str, given: BSDF, model: BSDF, accuracy: float | None = None) ->
     """Compare f of two materials.
 
     name      name of the class, for the finding
-    accuracy  relative difference that counts as equal; None: the default
+    accuracy  relative difference below which values count as equal; None selects the default
     Raises InputError for values that are not finite.
     """
     wo, wi = pairs(model, PAIRS)
@@ -38,8 +39,8 @@ def check(name: str, given: BSDF, model: BSDF, accuracy: float | None = None) ->
 
 
 def pairs(model: BSDF, count: int, seed: int = 1) -> tuple[Values, Values]:
-    """Random pairs of directions above the surface, (count, 3) each, selected by `seed`: half of the wi are uniform,
-    half are sampled by the model."""
+    """Random pairs of directions above the surface, (count, 3) each. Half of the wi are uniformly distributed, and half
+    are sampled by the model."""
     rng = np.random.default_rng(seed)
     wo, wi = (directions.on_side(directions.uniform(rng, count), 1) for _ in range(2))
     sampled = model.sample(wo, directions.numbers(rng, count), precision="float64")
@@ -53,7 +54,7 @@ def pairs(model: BSDF, count: int, seed: int = 1) -> tuple[Values, Values]:
 
 
 def _with_angles(finding: Finding, wo: Values, wi: Values) -> Finding:
-    """The finding with the angles of the worst pair in place of a line number."""
+    """The finding with the angles of the pair with the largest error instead of a line number."""
     if "line" not in finding.figures:
         return replace(finding, facts=tuple(fact.replace(" rows", " pairs of directions") for fact in finding.facts))
     row = int(finding.figures["line"]) - 1

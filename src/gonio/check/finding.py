@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 RIGHT, WRONG, ERROR, MISSING, BY_HAND = "right", "wrong", "input error", "not handed in", "by hand"
-ANOTHER = "another model"  # the kind of a file of values that names another model than the task's
+ANOTHER = "another model"  # the kind of work for a file of values of a model that is not the task's
 EXIT_CODES = {RIGHT: 0, BY_HAND: 0, WRONG: 1, MISSING: 1, ERROR: 2}
 
 
@@ -15,7 +15,7 @@ class Mistake:
     """A mistake in a solution.
 
     words  description with the formula: "k = (roughness + 1)^2 / 8 in place of alpha / 2"
-    topic  its location without the formula, for students who are to find it themselves: "the masking term G"
+    topic  location without the formula, for students who are to find the mistake themselves: "the masking term G"
     """
 
     words: str
@@ -27,13 +27,13 @@ class Finding:
     """The result for one piece of work.
 
     name     the file or class
-    kind     the kind of work that it was recognized as: "table of E", "values of f", ...
-    status   RIGHT, WRONG, ERROR (it could not be checked), MISSING or BY_HAND
-    facts    sentences that state what it was compared with, how large the difference is, and where
-    mistake  the probable mistake, None if no formula fits
+    kind     the recognized kind of work: "table of E", "values of f", ...
+    status   RIGHT, WRONG, ERROR (the work could not be checked), MISSING or BY_HAND
+    facts    sentences that state the basis of the comparison, and the size and location of the difference
+    mistake  the probable mistake; None if it is unknown
     figures  the numbers in `facts`
-    hidden   whether formulas and values of the solution are left out
-    remark   the material that it was compared with, if the command does not name it completely; "" otherwise
+    hidden   whether formulas and values of the solution are omitted
+    remark   the material used for the comparison, if the command does not specify it completely; "" otherwise
     """
 
     name: str
@@ -51,12 +51,12 @@ class Finding:
 
     @property
     def exit_code(self) -> int:
-        """0 if the work is right, 1 if it is wrong, 2 if it cannot be read."""
+        """0 if the work is right, 1 if it is wrong or missing, 2 if it cannot be read."""
         return EXIT_CODES[self.status]
 
     @property
     def cause(self) -> str:
-        """A description of the probable mistake, "" if unknown; only its topic if the solution is hidden."""
+        """A description of the probable mistake, or only its topic if the solution is hidden; "" if it is unknown."""
         if self.mistake is None:
             return ""
         return f"look at {self.mistake.topic}" if self.hidden else self.mistake.words
@@ -91,5 +91,5 @@ class Finding:
 
 
 def unreadable(name: str, why: str, hint: str = "") -> Finding:
-    """The finding for work that cannot be checked, with the reason `why`."""
+    """The finding for work that cannot be checked, for the reason `why`."""
     return Finding(name, "", ERROR, (f"{why}: {hint}" if hint else why,))

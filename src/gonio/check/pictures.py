@@ -1,7 +1,7 @@
-"""Compare a student's picture of a scene with Gonio's, allowing for small shifts, gamma and exposure.
+"""Comparison of a student's picture of a scene with Gonio's, allowing for small shifts, gamma encoding and exposure.
 
-The pictures are averaged over blocks, so that noise from few samples does not matter. The ratio of the two that most
-blocks have is attributed to exposure; objects with another ratio are named.
+The pictures are averaged over blocks, so that noise due to low sample counts has little effect. The most frequent ratio
+of the two pictures is attributed to the exposure; objects with a different ratio are reported.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ BLOCKS = 48  # along the longer side
 SPP = 64
 SHIFTS = range(-2, 3)  # pixels
 FITS = 0.04  # largest mean relative difference of the blocks: the noise of some 32 samples per pixel
-UNLIKE = 0.6  # correlation below which a picture shows something else
+UNLIKE = 0.6  # correlation below which a picture is considered to show another scene
 CLEAN = 0.02  # relative accuracy to which a ratio is identified with a known number
 
 
 class _Reading(NamedTuple):
-    """An interpretation of a picture: its description, the mistake that it implies, if any, and linear values."""
+    """An interpretation of a picture: its description, the mistake that it implies, if any, and the linear values."""
 
     words: str
     mistake: Mistake | None
@@ -48,7 +48,7 @@ class _Match(NamedTuple):
 
 
 def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool = False) -> Finding:
-    """Judge a picture of a scene. Raises InputError for a picture of another aspect ratio or of something else.
+    """Judge a picture of a scene. Raises InputError for a picture with a different aspect ratio or of another scene.
 
     allow_outside  allow the scene to read files outside its folder
     allow_code     allow the scene to run materials in Python files
@@ -79,9 +79,9 @@ def check(path: Path, scene: Path, allow_outside: bool = False, allow_code: bool
         )
     facts = [f"{best.distance:.1%} mean relative difference from Gonio's picture, by blocks of {block} pixels"]
     if best.reading.words:
-        facts.append(best.reading.words if best.distance <= FITS else f"nearest reading: {best.reading.words}")
+        facts.append(best.reading.words if best.distance <= FITS else f"closest interpretation: {best.reading.words}")
     if abs(best.scale - 1.0) > CLEAN:
-        facts.append(f"{written(best.scale, CLEAN)} times as bright, taken as exposure")
+        facts.append(f"{written(best.scale, CLEAN)} times as bright, which is attributed to the exposure")
     figures = {"difference": best.distance, "scale": best.scale}
     if best.reading.mistake is not None and best.distance <= FITS:
         return Finding(path.name, "picture", WRONG, tuple(facts), best.reading.mistake, figures)
@@ -104,7 +104,7 @@ def _read(scene: Path, outside: dict[str, bool]) -> SceneDescription:
 
 
 def _readings(path: Path, picture: images.Picture) -> Iterator[_Reading]:
-    """The picture as it is, and with each of the usual mistakes undone."""
+    """The unchanged picture, and the picture with each of the usual mistakes undone."""
     given = np.asarray(picture.pixels, float)
     encodings = [("", given)]
     if not picture.hdr:
@@ -118,7 +118,7 @@ def _readings(path: Path, picture: images.Picture) -> Iterator[_Reading]:
     }
     for words, pixels in encodings:
         for along_y, along_x in sorted(itertools.product(SHIFTS, SHIFTS), key=lambda s: abs(s[0]) + abs(s[1])):
-            moved = f"moved by {along_x} columns and {along_y} rows" if along_x or along_y else ""
+            moved = f"shifted by {along_x} columns and {along_y} rows" if along_x or along_y else ""
             both = "; ".join(filter(None, (words, moved)))
             yield _Reading(both, None, np.roll(pixels, (-along_y, -along_x), (0, 1)))
         for words_of_turn, turn in turns.items():
@@ -126,7 +126,7 @@ def _readings(path: Path, picture: images.Picture) -> Iterator[_Reading]:
 
 
 def _match(reading: _Reading, reference: Values, block: int, clip: float | None) -> _Match:
-    """The match of a reading: the exposure that most blocks have, and the remaining mean relative difference."""
+    """The match of a reading: the most frequent exposure of the blocks, and the remaining mean relative difference."""
     given = _blocks(reading.pixels, block)
     lit = reference > 0.02 * np.percentile(reference, 99.0)
     lit &= given < 0.98 if clip is None else True  # a .png clips at white
@@ -139,7 +139,7 @@ def _match(reading: _Reading, reference: Values, block: int, clip: float | None)
 
 
 def _mode(ratio: Values) -> float:
-    """The ratio with the most others within 2 % of it; 1 if a quarter of them are about 1, or if none is positive."""
+    """The most frequent ratio, up to 2 %; 1 if a quarter of the ratios are about 1, or if no ratio is positive."""
     logs = np.sort(np.log(ratio[ratio > 0.0]))
     if not len(logs) or np.mean(np.abs(logs) < 0.02) > 0.25:
         return 1.0
@@ -170,7 +170,7 @@ def _rendered(
 def _objects(
     scene: Path, size: tuple[int, int], outside: dict[str, bool], given: Values, reference: Values
 ) -> Iterator[tuple[str, Mistake | None]]:
-    """The difference on each object. Its pixels are those that become dark if the object is rendered black."""
+    """The difference on each object. The pixels of an object are those that become dark if it is rendered black."""
     shapes = _read(scene, outside).shapes
     for number, shape in enumerate(shapes):
         name = str(getattr(getattr(shape, "material", None), "type", ""))
@@ -196,7 +196,7 @@ def _objects(
 
 
 def _constant(which: str, ratio: Values, spread: Values) -> Mistake | None:
-    """The mistake of a factor that is a known number; None if the ratio is not constant or no such number."""
+    """The mistake of a constant factor; None if the ratio is not constant or not a known number."""
     if np.any(np.ptp(spread, axis=0) > 0.05 * ratio) or np.ptp(ratio) > CLEAN * ratio.max():
         return None
     text = written(float(ratio.mean()), CLEAN)

@@ -1,9 +1,11 @@
-"""Reference values with which students can check a program themselves: f at 200 pairs, tables of E and E_avg.
+"""Reference values with which students can check their programs: f at 200 pairs of directions, and tables of E and
+E_avg.
 
     gonio check --reference DIR                      every model of the courses, and the homework's tables
     gonio check oren-nayar -p sigma=0.5 --reference DIR
 
-Each file of values names its material, so that it can be given to `gonio check FILE MODEL` or checked against a sheet.
+Each file of values states its material, so that it can be passed to `gonio check FILE MODEL` or checked against a
+sheet.
 """
 
 from __future__ import annotations
@@ -45,7 +47,7 @@ def write(folder: str | Path, material: str | BSDF | None = None) -> list[Path]:
     """Write the values of one material, or the values and tables of the courses. Returns the paths of the files.
 
     material  a material, as a string or an object; None for all models of the courses
-    Either all files are written or none. Raises InputError for a folder that cannot be written.
+    Either all files are written or none. Raises InputError if the folder cannot be written.
     """
     place = files.check_folder(folder)
     if material is not None:
@@ -64,7 +66,7 @@ def write(folder: str | Path, material: str | BSDF | None = None) -> list[Path]:
 
 
 def values(material: BSDF) -> str:
-    """f at 200 pairs of directions, z up, in the format that `samples.read` reads."""
+    """f at 200 pairs of directions, with z up, in the format read by `samples.read`."""
     wo, wi = pairs(material, PAIRS)
     if material.transmits:
         wi = directions.uniform(np.random.default_rng(2), PAIRS)

@@ -1,4 +1,4 @@
-"""The results for a folder: submissions, their tasks and suggested marks."""
+"""The results for a folder: submissions, their tasks and the suggested points."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from xml.etree import ElementTree as xml
 from ..verify.ci.junit import clean
 from .finding import BY_HAND, ERROR, MISSING, RIGHT, WRONG, Finding
 
-PARTIAL = 0.5  # fraction of the points for a result with a known mistake, since the rest of it is right
+PARTIAL = 0.5  # fraction of the points for a result with a known mistake, because the rest of the solution is right
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A task, its points and its result."""
+    """A task with its points and its result."""
 
     task: str
     points: float
@@ -24,7 +24,7 @@ class Mark:
 
     @property
     def suggested(self) -> float | None:
-        """Suggested points; None if a person has to mark the work."""
+        """Suggested points; None if the work must be graded by a person."""
         if self.finding.status in (BY_HAND, ERROR):
             return None
         if self.finding.status == RIGHT:
@@ -34,14 +34,14 @@ class Mark:
 
 @dataclass(frozen=True)
 class Submission:
-    """The work of one student; `others` are files that belong to no task."""
+    """The work of one student; `others` lists files that match no task."""
 
     name: str
     marks: Sequence[Mark]
     others: tuple[str, ...] = ()
 
     def best(self) -> dict[str, Mark]:
-        """The mark of the best file of each task, in the sheet's order."""
+        """The mark of the best file of each task, in the order of the sheet."""
         best: dict[str, Mark] = {}
         for mark in self.marks:
             held = best.get(mark.task)
@@ -96,7 +96,7 @@ class Report:
                 rows.append((one.name, mark.task, finding.name, finding.status, points, why))
             total = sum(mark.points for mark in one.best().values())
             rows.append((one.name, "suggested", "", "", f"{one.points:g} / {total:g}", ""))
-            rows += [(one.name, "", name, "not checked", "", "not a file of a task") for name in one.others]
+            rows += [(one.name, "", name, "not checked", "", "matches no task") for name in one.others]
         return rows
 
     def as_dict(self) -> dict[str, Any]:

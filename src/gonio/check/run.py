@@ -1,4 +1,4 @@
-"""`gonio check` and `go.check`: recognize the kind of work that was handed in and check it."""
+"""`gonio check` and `go.check`: recognize the kind of a student's work and check it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .report import Mark, Report, Submission, junit
 
 @dataclass(frozen=True)
 class Work:
-    """The work to be checked, and the options of the check; the fields are arguments of `check`."""
+    """The work to be checked, and the options of the check. The fields are arguments of `check`."""
 
     target: str | Path | BSDF
     against: str | BSDF | None = None
@@ -56,7 +56,7 @@ class Work:
         return shader if shader != text and shaders.names_shader(shader) else text
 
     def model(self) -> BSDF:
-        """The material with which the work is compared. Raises InputError if none was given."""
+        """The material with which the work is compared. Raises InputError if none is given."""
         if isinstance(self.against, BSDF):
             return self.against
         if not self.against:
@@ -68,7 +68,7 @@ class Work:
 
 
 class WorkKeywords(TypedDict, total=False):
-    """The types of the fields of `Work` as keywords, except `target` and `against`."""
+    """The fields of `Work` except `target` and `against`, as keyword arguments, for type checkers."""
 
     scene: str | Path | None
     up: str
@@ -133,7 +133,7 @@ def check(
     junit: str | Path | None = None,
     **work: Unpack[WorkKeywords],
 ) -> Finding | Report:
-    """Judge a student's own work and name the probable mistake.
+    """Check a student's work, and report the size of the error and the probable mistake.
 
         go.check("E.png").facts                                  # its form (k, flip, 1 - E), and the difference
         go.check("f.csv", go.OrenNayar(sigma=0.3), up="y").cause
@@ -142,19 +142,19 @@ def check(
 
     target     a table of E or E_avg (.png, .exr, .npz); rows of wo, wi and f (.csv, .txt); a material, FILE.py:CLASS; a
                shader (.glsl, .wgsl, ...); a picture, with `scene`; a folder of these or of such folders, with `sheet`
-    against    the material with which the work is compared, as a string or an object; for a table, the masking term
-               that it must have
+    against    the material with which the work is compared, as a string or an object; for a table, the required
+               masking term
     scene      the scene that a picture shows; with `sheet`, a folder of scenes named like the pictures
     sheet      "hw4" or "lab2": the tasks and their points
     up         the axis along the normal in rows of directions: "z", "y" or "x"
-    tolerance  relative difference of f that counts as equal; None: 2e-3 for rows, 1e-4 for a material
+    tolerance  relative tolerance for values of f; None: 2e-3 for rows, 1e-4 for a material
     allow_outside, allow_code  permissions of scenes, as in `go.render`
-    hide_solution  leave out formulas and values of the solution
+    hide_solution  omit the formulas and values of the solution
     junit      path of a JUnit XML file for the verdicts
-    function   the function of a shader to check, in place of the one that its adapter names
+    function   the name of the shader function to check, in place of the function specified in the adapter
     Returns a Finding, or a Report for a folder; both have `passed`, `exit_code` and `as_dict`.
-    Raises InputError for work that cannot be read; in a folder, the error becomes a finding, and the other files are
-    judged.
+    Raises InputError for work that cannot be read. In a folder, the error becomes a finding, and the other files are
+    checked.
     """
     if junit is not None:
         check_file(junit)

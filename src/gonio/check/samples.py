@@ -1,4 +1,4 @@
-"""Files with values of f from any program (`measure.formats.rows`), compared with a material row by row."""
+"""Comparison of files with values of f from any program (`measure.formats.rows`) with a material, row by row."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from .stated import Asked, degenerate
 ACCURACY = 2e-3  # relative; allows for float32, six printed digits and angles from inverse trigonometric functions
 GRAZING = 1e-3  # cosine below which a division by it is inaccurate
 _COSINE = "the values are f cos theta_i, as in the sheet's equation 1"
-_NEARER = "compared with f cos theta_i, which is nearer to the values than f"
-COVER = 0.99  # fraction of the rows that must agree; the others must agree within ten times the accuracy
+_NEARER = "compared with f cos theta_i, which is closer to the values than f"
+COVER = 0.99  # fraction of the rows that must agree; the other rows must agree to within ten times the accuracy
 
 
 def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None) -> Finding:
-    """Judge a file of values. Raises InputError for a file that cannot be read.
+    """Judge a file of values. Raises InputError if the file cannot be read.
 
-    If no parameters are given, any parameters that explain the values are accepted, unless a known mistake explains
-    them with the defaults.
+    If no parameters are given, any parameters that explain the values are accepted, unless a known mistake with the
+    default parameters explains the values.
 
-    asked     the material to compare with
+    asked     the material with which the values are compared
     up        the axis along the normal: "z", "y" or "x"
-    accuracy  relative difference that counts as equal; None: the default
+    accuracy  relative difference below which values count as equal; None selects the default
     """
     rows = read(path, up)
     accuracy = ACCURACY if accuracy is None else accuracy
@@ -50,8 +50,8 @@ def check(path: Path, asked: Asked, up: str = "z", accuracy: float | None = None
 
 
 def _explaining(name: str, rows: Pairs, material: BSDF, accuracy: float) -> BSDF | None:
-    """The material with parameters that explain the values; None if there are none, or if they reduce it to a simpler
-    model."""
+    """The material with parameters that explain the values; None if there are no such parameters, or if they reduce
+    the material to a simpler model."""
     fine = np.minimum(rows.wo[:, 2], rows.wi[:, 2]) > GRAZING
     wo, wi, f = rows.wo[fine], rows.wi[fine], rows.f[fine]
     if not len(f) or np.any(f < 0.0) or not np.any(f):
@@ -64,10 +64,10 @@ def _explaining(name: str, rows: Pairs, material: BSDF, accuracy: float) -> BSDF
 
 
 def judge(name: str, rows: Pairs, material: BSDF, accuracy: float = ACCURACY, kind: str = "values of f") -> Finding:
-    """Compare values of f with a material's, row by row.
+    """Compare values of f with those of a material, row by row.
 
-    accuracy  relative difference that counts as equal
-    kind      kind of the work, for the finding
+    accuracy  relative difference below which values count as equal
+    kind      kind of work, for the finding
     """
     expected = f_of(material, rows.wo, rows.wi)
     if rows.f.shape[1] == 1:
@@ -99,8 +99,9 @@ def judge(name: str, rows: Pairs, material: BSDF, accuracy: float = ACCURACY, ki
         good = causes.close(rows.f, expected, accuracy)[fine]
         figures |= {"agree": float(good.mean()), "largest": float(error[worst]), "line": float(rows.line[worst])}
         facts[:0] = [
-            f"{good.mean():.1%} of {int(fine.sum())} rows agree within {accuracy:.2g} relative{_left_out(fine)}",
-            f"furthest off: line {rows.line[worst]}, f {_numbers(rows.f[worst])}, expected {_numbers(expected[worst])}",
+            f"{good.mean():.1%} of {int(fine.sum())} rows agree to within {accuracy:.2g} (relative){_left_out(fine)}",
+            f"largest error: line {rows.line[worst]}, f {_numbers(rows.f[worst])}, "
+            f"expected {_numbers(expected[worst])}",
         ]
         return Finding(name, kind, WRONG, tuple(facts), mistake, figures)
     error, worst = _error(rows.f, expected, fine, accuracy)
@@ -116,8 +117,8 @@ def _mistake(rows: Pairs, expected: Values, material: BSDF, fine: np.ndarray, ac
 
 
 def _has_cosine(rows: Pairs, expected: Values, fine: np.ndarray, accuracy: float) -> bool:
-    """Whether wrong values are nearer to f cos theta_i than to f: they agree in more rows, or in as many with a smaller
-    median difference."""
+    """Whether wrong values are closer to f cos theta_i than to f: they agree in more rows, or in the same number of
+    rows with a smaller median difference."""
 
     def distance(right: Values) -> tuple[float, float]:
         error, _ = _error(rows.f, right, fine, accuracy)
@@ -131,7 +132,7 @@ def _over(f: Values, cosine: Values) -> Values:
 
 
 def _left_out(fine: np.ndarray) -> str:
-    """A statement of the number of rows that do not count; "" if there are none."""
+    """A text that states the number of ignored rows; "" if there are none."""
     count = int(np.sum(~fine))
     return f"; {count} row{'s' if count > 1 else ''} at the horizon left out" if count else ""
 
@@ -142,9 +143,9 @@ def _agree(given: Values, expected: Values, fine: np.ndarray, accuracy: float) -
 
 
 def _error(given: Values, expected: Values, fine: np.ndarray, accuracy: float) -> tuple[Values, int]:
-    """The relative difference of each row, and the row off the horizon with the largest one.
+    """The relative difference of each row, and the row with the largest difference among those above the horizon.
 
-    Values are not divided by less than 1e-3 of the brightest (99th percentile).
+    The divisor is at least 1e-3 of the 99th percentile of the values.
     """
     size = np.maximum(np.abs(given), np.abs(expected))
     error = (np.abs(given - expected) / np.maximum(size, 1e-3 * np.percentile(size, 99.0) + 1e-30)).max(axis=1)
@@ -156,7 +157,10 @@ def _numbers(values: Values) -> str:
 
 
 def read(path: Path, up: str = "z") -> Pairs:
-    """The rows of a file, converted from the axis `up` to z up. Raises InputError, with the line, if it is damaged."""
+    """The rows of a file, converted to z up. Raises InputError, with the line number, if the file is damaged.
+
+    up  the axis along the normal in the file: "z", "y" or "x"
+    """
     if up not in files.UP:
         raise InputError(f"unknown axis '{up}'", "--up", "give the axis along the normal: z, y or x")
     try:

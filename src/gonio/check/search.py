@@ -1,4 +1,4 @@
-"""Find the parameters that explain the values of f in a file that names none, by least squares over a few numbers."""
+"""Search for parameters that explain the values of f in a file without parameters, by least squares."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from ..material import BSDF, tree
 from ..material.parameters import Parameter
 from .mistakes import Values, f_of
 
-MOST = 3  # most parameters; with more, almost any values can be explained
+MOST = 3  # largest number of parameters; with more parameters, almost any values can be explained
 _KINDS = ("float", "spectrum", "alpha")
-_STARTS = (1.0, 0.25, 4.0, 0.0625, 16.0)  # multiples of the default; the width of a lobe has a narrow basin
-_LEAST, _LARGEST = 1e-6, 1e4  # bounds of the parameters, since the search is in logarithms
+_STARTS = (1.0, 0.25, 4.0, 0.0625, 16.0)  # multiples of the default; lobe widths have a narrow basin of convergence
+_LEAST, _LARGEST = 1e-6, 1e4  # bounds of the parameters, which the logarithmic search requires
 _DIGITS = (2, 3, 4, 6)  # significant digits of the result, fewest first
 
 
 def candidates(material: BSDF, wo: Values, wi: Values, f: Values) -> Iterator[BSDF]:
-    """The material with the numbers that best fit values of f (N, 1 or 3), rounded to more and more digits.
+    """The material with the parameters that best fit values of f (N, 1 or 3), rounded to an increasing number of
+    digits.
 
     Yields nothing for a model whose f depends on more than `MOST` parameters.
     """
@@ -39,7 +40,7 @@ def candidates(material: BSDF, wo: Values, wi: Values, f: Values) -> Iterator[BS
 
 
 def described(material: BSDF) -> str:
-    """The numbers of a material: "kd=0.25, ks=0.6, p=16"."""
+    """The parameters of a material as text: "kd=0.25, ks=0.6, p=16"."""
     return ", ".join(f"{name}={notation.written(value)}" for name, value in notation.settings(material).items())
 
 
@@ -60,7 +61,7 @@ def _nearest(
     material: BSDF, names: dict[str, Parameter], layout: list[tuple[str, int]], wo: Values, wi: Values, f: Values
 ) -> Values | None:
     """The values of the parameters, concatenated, that minimize the relative differences of f."""
-    from scipy.optimize import least_squares  # imported late: few checks search
+    from scipy.optimize import least_squares  # imported late, because few checks need a search
 
     size = np.abs(f) + 1e-3 * np.abs(f).max() + 1e-30
 
@@ -84,7 +85,7 @@ def _nearest(
 
 
 def _changed(material: BSDF, layout: list[tuple[str, int]], values: Values) -> BSDF | None:
-    """The material with other numbers; None if it does not allow them."""
+    """The material with other values; None if these values are invalid."""
     changes: dict[str, object] = {}
     at = 0
     for name, count in layout:

@@ -1,8 +1,8 @@
 """The assignment sheets of the courses, as tasks with points, and the results for submissions.
 
-A file belongs to the first task whose pattern its name matches. A file of values may name its parameters and its frame
-in comments, `# model: oren-nayar(sigma=0.5)` and `# up: y`; the task prescribes the model and its terms. Code is not
-run.
+A file is assigned to the first task whose pattern matches its name. A file of values may state its parameters and its
+frame in comments, `# model: oren-nayar(sigma=0.5)` and `# up: y`; the task prescribes the model and its terms. Code is
+not run.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LEFT_ALONE = (
     ".glsl", ".frag", ".vert", ".hlsl", ".wgsl", ".o", ".obj", ".exe", ".cmake", ".sln", ".vcxproj", ".json", ".toml",
     ".pdf", ".doc", ".docx", ".md", ".tex", ".html",
 )  # fmt: skip
-SPLIT = "A + B"  # the table of the split sum, which is E: one channel, or A in red and B in green
+SPLIT = "A + B"  # the table of the split sum, which equals E: one channel, or A in red and B in green
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class Task:
     """One task of an assignment sheet.
 
     files  a regular expression for file names without suffix, in lower case
-    model  the material of files of values, with the task's terms; "" if the task has no such files
-    forms  other models that can express the same material
+    model  the material of files of values, with the terms of the task; "" if the task has no such files
+    forms  other models that represent the same material
     table  "E", "E_avg", "E, sampled by importance", or SPLIT; "" for a task without a table
     """
 
@@ -77,12 +77,12 @@ LAB2 = (
     ),
     Task("report", 4, r".*(report|readme|lab2|\u62a5\u544a).*"),
 )
-PICTURE = Task("picture", 0, "")  # a picture named after the scene that it shows
+PICTURE = Task("picture", 0, "")  # a picture with the name of the scene that it shows
 SHEETS = {"hw4": HW4, "lab2": LAB2}
 
 
 def check(folder: Path, sheet: str, scenes: Path | None = None, up: str = "z") -> Report:
-    """Judge a folder, or each folder of a class. Raises InputError for an unknown sheet and for a folder without files.
+    """Judge a folder, or each folder of a class. Raises InputError for an unknown sheet or an empty folder.
 
     sheet   name of the assignment sheet, "hw4" or "lab2"
     scenes  a folder of scenes, or one scene; pictures are compared with the scene of the same name
@@ -95,7 +95,7 @@ def check(folder: Path, sheet: str, scenes: Path | None = None, up: str = "z") -
 
 
 def _submissions(folder: Path) -> list[Path]:
-    """The folder itself if it contains files, else the folders in it."""
+    """The folder itself if it contains files, otherwise its subfolders."""
     entries = sorted(entry for entry in folder.iterdir() if not entry.name.startswith("."))
     if not entries:
         raise InputError("the folder is empty", str(folder), "give the folder of a submission, or of several")
@@ -114,7 +114,7 @@ def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: 
         (others if task is None else files_of[task.name]).append(path)
     tables_of = {task.table: files_of[task.name] for task in tasks if task.table}
     if not tables_of.get("E", [0]) and tables_of.get("E, sampled by importance"):
-        files_of["E(mu)"] = tables_of["E, sampled by importance"][:1]  # it solves this task too
+        files_of["E(mu)"] = tables_of["E, sampled by importance"][:1]  # it solves this task, too
     own = _own_table(files_of.get("E(mu)", []))
     marks = [
         Mark(task.name, task.points, one)
@@ -128,8 +128,8 @@ def _submission(folder: Path, tasks: tuple[Task, ...], scenes: Path | None, up: 
 
 
 def task_of(tasks: tuple[Task, ...], path: Path) -> Task | None:
-    """The first task whose pattern a file's name matches; None if there is none, or if the task is a table and the file
-    a source file or document."""
+    """The first task whose pattern matches a file's name; None if there is none, or if the task is a table and the file
+    is a source file or document."""
     task = next((one for one in tasks if re.fullmatch(one.files, path.stem.lower())), None)
     return None if task is not None and task.table and path.suffix.lower() in LEFT_ALONE else task
 
@@ -144,7 +144,7 @@ def _own_table(files: list[Path]) -> tables.Table | None:
 
 
 def _judged(task: Task, files: list[Path], own: tables.Table | None, scenes: Path | None, up: str) -> Iterator[Finding]:
-    """One finding per file of a task; for a task without files, one that says so."""
+    """One finding per file of a task, or a finding of the status MISSING for a task without files."""
     if not files:
         yield Finding("", "", MISSING)
     for path in files:
@@ -155,7 +155,7 @@ def _judged(task: Task, files: list[Path], own: tables.Table | None, scenes: Pat
 
 
 def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, up: str) -> Finding:
-    """The finding for one file of a task. Raises InputError for a file that cannot be read."""
+    """The finding for one file of a task. Raises InputError if the file cannot be read."""
     suffix = path.suffix.lower()
     scene = _scene_of(path, scenes)
     if task.table == SPLIT and scene is not None and suffix in PICTURES:
@@ -173,7 +173,7 @@ def _one(task: Task, path: Path, own: tables.Table | None, scenes: Path | None, 
 
 
 def _values(task: Task, path: Path, up: str) -> Finding:
-    """The finding for values of f, compared with the task's model with the parameters that the file names."""
+    """The finding for values of f, compared with the task's model with the parameters stated in the file."""
     up = stated.comments(path).get("up", up)
     try:
         asked = stated.for_task(path, (task.model, *task.forms))
@@ -193,7 +193,7 @@ def _table(task: Task, path: Path, own: tables.Table | None) -> Finding:
 
 
 def _scene_of(path: Path, scenes: Path | None) -> Path | None:
-    """The scene that a picture is named after."""
+    """The scene with the name of a picture; None if there is none."""
     if scenes is None:
         return None
     if (scenes / "scene.json").exists():

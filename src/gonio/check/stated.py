@@ -1,11 +1,11 @@
-"""The model with which values of f are compared: the requested one, with the parameters that the file itself names.
+"""The model with which values of f are compared: the requested model, with the parameters stated in the file itself.
 
     # model: oren-nayar(sigma=0.5)      a comment in the file
     # up: y
 
 On the command line, the user's settings take precedence over this line. In a folder, the sheet prescribes the model and
-its terms (distribution, masking, kind of Fresnel term), and the line gives only numbers: a file must not choose the
-model with which it is compared.
+its terms (distribution, masking, kind of Fresnel term), and only numbers are taken from the line: a file must not
+determine the model with which it is compared.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ _EDGE = "edge"  # a parameter of `metal` that, unlike other numbers, changes the
 class Asked:
     """The material with which values are compared.
 
-    remark    a statement of the source of its parameters; "" if the user named it completely
-    defaults  whether neither the user nor the file named parameters, so that the values may have other ones
+    remark    a statement of the source of its parameters; "" if the user specified it completely
+    defaults  whether neither the user nor the file specified parameters, so that other parameters are possible
     """
 
     material: BSDF
@@ -43,18 +43,18 @@ class Asked:
 
 
 class Line(NamedTuple):
-    """The model that the file's line names: its class, and its settings by parameter name."""
+    """The model specified by the line `# model:`: its class, and its settings by parameter name."""
 
     cls: type[BSDF]
     settings: dict[str, object]
 
 
 class AnotherModelError(InputError):
-    """A file names another model, or other terms, than the sheet prescribes."""
+    """A file specifies a different model, or different terms, than the sheet prescribes."""
 
 
 def comments(path: Path) -> dict[str, str]:
-    """The "model" and "up" that the file's comments name, if any; empty for a file that cannot be read."""
+    """The values of "model" and "up" in the file's comments, if any; empty for a file that cannot be read."""
     try:
         return rows.comments(path.read_bytes())
     except OSError:
@@ -62,8 +62,8 @@ def comments(path: Path) -> dict[str, str]:
 
 
 def for_command(path: Path, against: str | BSDF | None) -> Asked:
-    """The material of a command: `against`, with the settings of the file's line for parameters that the command does
-    not give, or else the material of the line. Raises InputError if neither names one."""
+    """The material of a command: `against`, with the settings of the file's line for parameters that the command omits,
+    or else the material of the line. Raises InputError if neither specifies a material."""
     if isinstance(against, BSDF):
         return Asked(against)
     text = comments(path).get("model", "")
@@ -91,8 +91,9 @@ def for_command(path: Path, against: str | BSDF | None) -> Asked:
 def for_task(path: Path, models: tuple[str, ...]) -> Asked:
     """The material of a task: its model and terms, with the parameters of the file's line.
 
-    models  forms of the same material, the usual one first
-    Raises AnotherModelError if the line names another model or other terms, InputError if it cannot be interpreted.
+    models  representations of the same material, the usual one first
+    Raises AnotherModelError if the line specifies a different model or different terms, InputError if it cannot be
+    interpreted.
     """
     text = comments(path).get("model", "")
     if not text:
@@ -111,10 +112,10 @@ def for_task(path: Path, models: tuple[str, ...]) -> Asked:
 
 
 def degenerate(material: BSDF, wo: np.ndarray, wi: np.ndarray, accuracy: float) -> str:
-    """The reason why values of a material say nothing about its model, since its parameters reduce it to a simpler
-    one; "" if they do not.
+    """The reason why values of a material cannot confirm its model: its parameters reduce it to a simpler one. The
+    result is "" if they do not.
 
-    accuracy  relative difference that counts as equal
+    accuracy  relative difference below which values count as equal
     """
     f = f_of(material, wo, wi)
     lit = f[f[:, 0] > 0.0]
@@ -132,7 +133,8 @@ def degenerate(material: BSDF, wo: np.ndarray, wi: np.ndarray, accuracy: float) 
 
 
 def _line(text: str, where: str) -> Line:
-    """The model of a line. Raises InputError for code, which a file must not run, and for an unknown material."""
+    """The model of a line. Raises InputError for code, which must not be run from a file, and for an unknown
+    material."""
     if ".py" in text.lower():
         raise InputError(f"'{text}' is code, which is not run from a file", where, "name a model of Gonio's")
     try:
@@ -142,15 +144,15 @@ def _line(text: str, where: str) -> Line:
 
 
 def _without_preset(line: Line, own: Mapping[str, object]) -> dict[str, object]:
-    """The settings of a line, without those that the preset in `own` sets."""
+    """The settings of a line, without those that are set by the preset in `own`."""
     preset = line.cls.presets().get(str(own.get("preset", "")))
     hidden = set(preset.values) if preset is not None else set()
     return {name: value for name, value in line.settings.items() if name not in hidden}
 
 
 def _terms(wanted: BSDF, given: BSDF, where: str) -> dict[str, object]:
-    """The choices of the wanted material, by path. Raises AnotherModelError if the given one has different choices or
-    inner materials; a default of an inner material does not count as a choice."""
+    """The choices of the wanted material, by path. Raises AnotherModelError if the given material has different choices
+    or inner materials. A default of an inner material does not count as a choice."""
     inside = dict(tree.walk(given))
     terms: dict[str, object] = {}
     for path, inner in tree.walk(wanted):
@@ -170,7 +172,7 @@ def _terms(wanted: BSDF, given: BSDF, where: str) -> dict[str, object]:
 
 
 def _with_defaults(material: BSDF, own: Mapping[str, object]) -> Asked:
-    """A material that the file does not describe; the remark lists its numbers if the user gave no settings."""
+    """A material that is not specified in the file. If the user gave no settings, the remark lists its parameters."""
     numbers = {
         name: getattr(material, name)
         for name, parameter in type(material).parameters().items()

@@ -1,6 +1,6 @@
-"""Right and wrong tables of E[roughness, mu], as programs for the homework would compute them.
+"""Correct and incorrect tables of E[roughness, mu], as programs for the homework would compute them.
 
-Every form is an integral over the same visible normals of GGX, so that forty of them cost hardly more than one:
+Every form is an integral over the same visible normals of GGX, so forty forms cost hardly more than one:
 
     E = mean over m of G w / G1(o),   w = 1, or the factor by which a mistake changes the integrand
 
@@ -32,8 +32,8 @@ class Form(NamedTuple):
     """A table E[roughness, mu].
 
     words    description of the form: "k = alpha / 2"
-    mistake  None if the form is right
-    masking  Gonio's name for its masking term, "" if it has none
+    mistake  the mistake; None if the form is correct
+    masking  Gonio's name for the masking term; "" if there is none
     """
 
     words: str
@@ -49,7 +49,7 @@ def nodes(size: int, count: int = NODES) -> NDArray[np.intp]:
 
 @functools.lru_cache(maxsize=8)
 def forms(size: int) -> tuple[Form, ...]:
-    """All forms at the nodes of a table of the given size, right ones first."""
+    """All forms at the nodes of a table of the given size, correct forms first."""
     at = (nodes(size) + 0.5) / size
     right = _with_width(at, at, at**2)
     tables = [
@@ -119,7 +119,7 @@ class _with_width:
         self.cos_i, self.o_m, self.n_m = self._reflected()
 
     def _reflected(self) -> tuple[Values, Values, Values]:
-        """n.i, o.m and n.m for visible normals m (Heitz2018) and the directions i that they reflect o to."""
+        """n.i, o.m and n.m for visible normals m (Heitz2018), where i is the reflection of o at m."""
         u = hammersley(POINTS)
         u1, u2 = u[:, 0][None, None], u[:, 1][None, None]
         sine = np.sqrt(1.0 - self.mu**2)
@@ -175,7 +175,7 @@ class _with_width:
         return values
 
     def mean_of_light(self) -> Values:
-        """2 max(0, n.i) averaged over normals of density D(m) n.m, (roughness, mu)."""
+        """2 max(0, n.i), averaged over normals with the density D(m) n.m, (roughness, mu)."""
         u = hammersley(POINTS)
         t = self.alpha * np.sqrt(u[:, 0] / (1.0 - u[:, 0]))[None, None]
         c = 1.0 / np.sqrt(1.0 + t**2)
@@ -187,8 +187,8 @@ class _with_width:
 
 
 class Weighting(NamedTuple):
-    """A way to average E over mu: its description, the mistake (None if it is right), and the weights of E,
-    [roughness, mu]."""
+    """A method of averaging E over mu: its description, the mistake (None if the method is correct), and the weights of
+    E, [roughness, mu]."""
 
     words: str
     mistake: Mistake | None
@@ -197,7 +197,7 @@ class Weighting(NamedTuple):
 
 @functools.lru_cache(maxsize=8)
 def weightings(size: int, columns: int) -> tuple[Weighting, ...]:
-    """Right and wrong averages over `columns` values of mu, for the rows of `nodes(size)`."""
+    """Correct and incorrect averages over `columns` values of mu, for the rows of `nodes(size)`."""
     at, mu = (nodes(size) + 0.5) / size, (np.arange(columns) + 0.5) / columns
     one = np.ones((len(at), 1))
     topic = "the weights of the average"
@@ -223,7 +223,7 @@ def weightings(size: int, columns: int) -> tuple[Weighting, ...]:
 
 @functools.lru_cache(maxsize=8)
 def columns_of(size: int) -> tuple[Form, ...]:
-    """The right forms of E in the rows of `nodes(size)` and at 64 values of mu, for averages."""
+    """The correct forms of E in the rows of `nodes(size)` and at 64 values of mu, for averages."""
     at, mu = (nodes(size) + 0.5) / size, (np.arange(64) + 0.5) / 64
     right = _with_width(at, mu, at**2)
     return tuple(
@@ -242,7 +242,8 @@ def columns_of(size: int) -> tuple[Form, ...]:
 
 @functools.lru_cache(maxsize=16)
 def cosine_sampled(size: int, masking: str, floor: float) -> Values:
-    """E at the nodes by 32 x 32 jittered cosine-weighted directions per mu, with D's denominator at least `floor`."""
+    """E at the nodes, computed with 32 x 32 jittered cosine-weighted directions per mu; the denominator of D is at
+    least `floor`."""
     at = (nodes(size) + 0.5) / size
     jitter = np.random.default_rng(1).random((2, len(at), STRATA, STRATA))
     cell = np.arange(STRATA)

@@ -1,7 +1,8 @@
-"""Judge pictures of tables of E and E_avg, such as the homework's, by the form that fits best and its distance.
+"""Check of pictures of tables of E and E_avg, such as those of the homework, by the best-fitting form and its distance.
 
-Distances are root mean squares in gray levels of 255. A form is identified by the rows of roughness 0.55 and above,
-where cosine sampling has converged. Below, a table by cosine sampling is noisy and too dark, which is not a mistake.
+Distances are root-mean-square differences in gray levels (0 to 255). A form is identified from the rows of roughness
+0.55 and above, where cosine sampling has converged. At lower roughness, a table computed by cosine sampling is noisy
+and too dark, which is not a mistake.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from .table_forms import Form, Values
 
 LEVELS = 255.0
 FITS = 3.0  # gray levels within which a form explains a table
-NOISY = 8.0  # the same for a table computed with random cosine-weighted directions
+NOISY = 8.0  # the corresponding limit for a table computed with random cosine-weighted directions
 CONVERGED = 0.55  # lowest roughness at which cosine sampling with 1,024 directions has converged
 ROWS = 10.0  # gray levels within which a sampling method explains the means of rows of low roughness
-SURE = 1.1  # the right forms must be this many times as far off as a mistake, or the mistake is only probable
+SURE = 1.1  # smallest ratio of the distance of correct forms to that of a mistake; below, the mistake is only probable
 GRAIN = 0.3  # correlation of the errors of neighboring texels below which they are noise
 NOISY_WEIGHT = 0.05  # weight of the distance over all rows
 WHITE = 0.95  # fraction of white texels above which a factor cannot be determined
@@ -51,7 +52,7 @@ class Table:
 
 
 class _Layout(NamedTuple):
-    """A layout of the table in the picture: its description, the mistake, if it is one, and values [roughness, mu]."""
+    """A layout of the table in the picture: its description, the mistake, if any, and the values [roughness, mu]."""
 
     words: str
     mistake: Mistake | None
@@ -59,7 +60,7 @@ class _Layout(NamedTuple):
 
 
 def _layouts(picture: Values) -> Iterator[_Layout]:
-    """E[roughness, mu] for each layout of the picture, the homework's first."""
+    """E[roughness, mu] for each layout of the picture, with the homework's layout first."""
 
     def wrong(words: str) -> Mistake:
         return Mistake(words, _LAYOUT)
@@ -78,7 +79,7 @@ def _layouts(picture: Values) -> Iterator[_Layout]:
 
 
 class _Stored(NamedTuple):
-    """A way to store E: its description, the mistake (None if it is right), and the stored values."""
+    """A method of storing E: its description, the mistake (None if the method is correct), and the stored values."""
 
     words: str
     mistake: Mistake | None
@@ -90,7 +91,7 @@ _SCALES = {"pi": np.pi, "1 / pi": 1 / np.pi, "2": 2.0, "1 / 2": 0.5, "4": 4.0, "
 
 
 def _stored(E: Values, scales: bool) -> Iterator[_Stored]:
-    """E in each way of storing it, as values in [0, 1].
+    """E as stored by each method, as values in [0, 1].
 
     scales  whether to include mistakes that scale E by a known factor
     """
@@ -119,7 +120,7 @@ def _encoded(linear: Values) -> Values:
 
 
 class _Match(NamedTuple):
-    """A form, how it is stored and laid out, and its distance in the converged rows, in gray levels."""
+    """A form with its storage method and layout, and its distance in the converged rows, in gray levels."""
 
     form: Form
     stored: _Stored
@@ -134,8 +135,8 @@ class _Match(NamedTuple):
 def read(path: Path, channels: int = 1) -> Table:
     """The table in a picture or in an .npz array. Raises InputError for anything else.
 
-    channels  1, or 2 for a split sum, whose table is the sum of A in red and B in green; a gray picture holds the sum
-              itself
+    channels  1, or 2 for a split sum, whose table is the sum of A in red and B in green; a gray picture contains the
+              sum itself
     """
     if path.suffix.lower() == ".png" and _depth(path) == 16:
         raise InputError("a 16-bit picture given", path.name, "write 8 bits per channel, E * 255, as the homework does")
@@ -159,19 +160,19 @@ def _depth(path: Path) -> int:
 def check(table: Table, expected: str = "", sampled: bool = False) -> Finding:
     """Judge a table of E, or of E_avg if it is constant along an axis.
 
-    expected  the name of the required masking term; "" accepts the homework's two and Smith's
-    sampled   whether importance sampling of normals is required, so that low roughness is free of noise
-    Raises InputError for a picture that holds no such table.
+    expected  the name of the required masking term; "" accepts the two terms of the homework and Smith's
+    sampled   whether importance sampling of normals is required, so that rows of low roughness are free of noise
+    Raises InputError for a picture that contains no such table.
     """
     _check(table, expected)
     return _average(table, None, expected) if table.constant else _directional(table, expected, sampled)
 
 
 def check_average(table: Table, own: Table | None, expected: str = "") -> Finding:
-    """Judge a table of E_avg by the right tables of E, or by the student's own table of E, which may be wrong itself.
+    """Judge a table of E_avg by the correct tables of E, or by the student's own table of E, which may itself be wrong.
 
     own       the student's own table of E; None if there is none
-    expected  the name of the required masking term; "" accepts the homework's two and Smith's
+    expected  the name of the required masking term; "" accepts the two terms of the homework and Smith's
     """
     _check(table, expected)
     return _average(table, own, expected)
@@ -224,12 +225,12 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
     if best.distance <= (NOISY if right else limit) and not converged:
         facts += _sampling(best, at, size, low, figures)
     if noise and best.distance > FITS:
-        facts.append("the rest is noise of random directions: more of them would show how close the mean is")
+        facts.append("the rest is noise of random directions: with more directions, the comparison is more precise")
     if best.distance > (NOISY if right and not converged else fits):
-        facts.append("no form fits: the table is wrong in a way that is not known here")
+        facts.append("no form fits: the table is wrong, but the mistake is unknown")
         return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
     if np.mean(inside[~low] >= LEVELS - 1.0) > WHITE:
-        facts.append("nearly all texels are white: the values exceed 1, by a factor that white texels do not reveal")
+        facts.append("nearly all texels are white: the values exceed 1, by a factor that cannot be determined")
         return Finding(table.name, "table of E", WRONG, tuple(facts), None, figures)
     _check_encoding(table, best.stored)
     mistake = _certain(best, matches) or _unexpected(best.form, expected)
@@ -240,15 +241,16 @@ def _directional(table: Table, expected: str, sampled: bool) -> Finding:
 
 
 def _noise(values: Values) -> float:
-    """The rms noise of a table in gray levels, from second differences along roughness above `CONVERGED`, where E is
-    smooth at every mu."""
+    """The rms noise of a table in gray levels, estimated from second differences along roughness above `CONVERGED`,
+    where E is smooth at every mu."""
     rows = values[int(CONVERGED * len(values)) :] * LEVELS
     second = rows[2:] - 2.0 * rows[1:-1] + rows[:-2]
     return float(np.sqrt(np.mean(second**2) / 6.0))  # a second difference has 1 + 4 + 1 times the variance
 
 
 def _certain(best: _Match, matches: list[_Match]) -> Mistake | None:
-    """The mistake of the nearest match, called probable if a right form is about as near; None if it is right."""
+    """The mistake of the nearest match, described as probable if a correct form is almost as close; None if the nearest
+    match is correct."""
     if best.mistake is None:
         return None
     right = min((one.distance for one in matches if one.mistake is None), default=np.inf)
@@ -269,7 +271,7 @@ def _check_encoding(table: Table, stored: _Stored) -> None:
 
 
 def _unexpected(form: Form, expected: str) -> Mistake | None:
-    """The mistake of a right form with another masking term than the expected one; None if there is none."""
+    """The mistake of a correct form whose masking term is not the expected one; None if it is."""
     if not expected or form.masking == expected:
         return None
     asked = next(f.words for f in table_forms.forms(SIZES[0]) if f.masking == expected)
@@ -286,7 +288,7 @@ def _matches(picture: Values, forms: tuple[Form, ...], at: np.ndarray) -> list[_
             faults = sum(one.mistake is not None for one in (form, stored, layout))
             distance = _rms(values[rows] - stored.values[rows]) * LEVELS
             # An additional mistake must reduce the distance by about a tenth plus a quarter of a gray level. The noisy
-            # rows have a small weight, but if the others are white, only they distinguish the forms.
+            # rows have a small weight, but if the other rows are white, only the noisy rows distinguish the forms.
             cost = (distance + 0.5) * (1.0 + 0.1 * faults) + 0.25 * faults
             cost += NOISY_WEIGHT * _rms(values - stored.values) * LEVELS
             matches.append((cost, order, _Match(form, stored, layout, distance)))
@@ -309,9 +311,10 @@ _FLOORS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 
 
 def _sampling(best: _Match, at: np.ndarray, size: int, low: np.ndarray, figures: dict[str, float]) -> list[str]:
-    """Sentences that explain the rows of low roughness: cosine sampling, a floor of D's denominator, bytes that wrap.
+    """Sentences that describe the rows of low roughness: cosine sampling, a lower bound of D's denominator, and byte
+    values that wrap.
 
-    The samples are random, so only means over rows can be compared.
+    The samples are random, so only the means of rows can be compared.
     """
     invert = bool(best.stored.words)
     values = best.layout.values[np.ix_(at, at)][low].mean(axis=1)
@@ -327,7 +330,8 @@ def _sampling(best: _Match, at: np.ndarray, size: int, low: np.ndarray, figures:
     denominator = f"D's denominator is at least {floor:g}" if floor else "D's denominator has no floor"
     bytes_ = "bytes wrap at 256" if wrapped else "no byte wraps at 256"
     return [
-        "below, as by cosine-weighted directions: noisy and too dark, which importance sampling (bonus 1) avoids",
+        "at lower roughness, noisy and too dark, as with cosine-weighted directions; importance sampling (bonus 1) "
+        "avoids this",
         f"nearest: 32 x 32 stratified directions; {denominator}, {bytes_}; rows are {distance:.2g} gray levels off"
         if distance <= ROWS
         else f"how the directions are drawn cannot be told: the nearest known way is {distance:.0f} gray levels off",
@@ -350,8 +354,8 @@ def _rms(difference: Values) -> float:
 
 
 def _average(table: Table, own: Table | None, expected: str) -> Finding:
-    """Judge a table of E_avg: averages of each right E, and of the student's own, with every weighting, storage and
-    layout."""
+    """Judge a table of E_avg by averages of each correct E, and of the student's own E, with every weighting, storage
+    method and layout."""
     size = len(table.values)
     at = table_forms.nodes(size)
     if not table.constant:
@@ -380,7 +384,7 @@ def _average(table: Table, own: Table | None, expected: str) -> Finding:
     facts = [f"nearest: {text}", f"{distance:.2g} gray levels of 255 off (rms)"]
     figures = {"all": distance}
     if distance > FITS:
-        facts.append("no form fits: the table is wrong in a way that is not known here")
+        facts.append("no form fits: the table is wrong, but the mistake is unknown")
         return Finding(table.name, "table of E_avg", WRONG, tuple(facts), None, figures)
     _check_encoding(table, stored)
     if across:

@@ -1,10 +1,11 @@
-"""The command line: thin verbs that call the packages below, without logic of their own. One file per verb in `verbs`.
+"""The command line. Its subcommands, called verbs, contain no logic of their own, but call the packages below; each
+verb is one file in `verbs`.
 
-Nothing is imported at module level, so that every import happens inside `main`, where Ctrl-C prints a single line.
-`app` imports nothing heavy, so that `gonio --help` takes little longer than Python and Typer: each verb imports what it
-needs when it runs. Errors are printed in one place, `app.run`.
+Nothing is imported at module level, so that every import takes place inside `main`, where Ctrl-C prints a single line.
+`app` imports only small modules, and each verb imports its dependencies when it runs, so that `gonio --help` takes
+little longer than the start of Python and Typer. All errors are printed by `app.run`.
 
-Exit codes: 0 done, 1 a verdict of "fails", 2 bad usage or input, 3 a fault of the machine, 130 ended by Ctrl-C (143 by
+Exit codes: 0 success, 1 a verdict of "fails", 2 invalid usage or input, 3 a machine error, 130 ended by Ctrl-C (143 by
 SIGTERM, 129 by SIGHUP).
 """
 

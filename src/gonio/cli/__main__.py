@@ -1,4 +1,4 @@
-"""`python -m gonio.cli`."""
+"""Entry point of `python -m gonio.cli`."""
 
 from . import main
 

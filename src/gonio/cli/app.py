@@ -1,4 +1,4 @@
-"""The `gonio` command itself: its options, its errors and its exit codes."""
+"""The `gonio` command: its options, error messages and exit codes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _styled(text: str) -> str:
 class _Command(TyperCommand):
     def make_parser(self, ctx: typer.Context) -> Any:  # type: ignore[override]
         parser = super().make_parser(ctx)  # type: ignore[arg-type]
-        from . import renamed  # imported late, since the list of verbs does not need it
+        from . import renamed  # imported late, because the list of verbs does not need it
 
         renamed.accept(parser, self.name or "")
         return parser
@@ -81,8 +81,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Exit codes: 0 success, 1 failed verdict, 2 bad usage or input, 3 machine fault, 4 invisible violations "
-    "only, 130 Ctrl-C.",
+    epilog="Exit codes: 0 success, 1 failed verdict, 2 invalid usage or input, 3 machine error, 4 only invisible "
+    "violations, 130 ended by Ctrl-C.",
 )
 
 
@@ -125,13 +125,13 @@ def _fail(error: GonioError, as_json: bool) -> int:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *place: object, **more: object) -> None:
-    """Print Gonio's own warnings, one line each; warnings of libraries are shown only with --debug."""
+    """Print Gonio's own warnings, one line each. Warnings of libraries are shown only with --debug."""
     if issubclass(category, GonioWarning) or os.environ.get("GONIO_DEBUG"):
         print(f"warning: {message}", file=sys.stderr)
 
 
 def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
-    """Run the command and return its exit code; `ended` holds the signal that ended it, if any."""
+    """Run the command and return its exit code. `ended` receives the signal that ended the command, if any."""
     given = sys.argv[1:] if arguments is None else arguments
     ended = ended or Ended()
     warnings.showwarning = _show_warning
@@ -148,7 +148,7 @@ def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
             streams.silence(sys.stdout, sys.stderr)
             return ended.code
         streams.silence(sys.stdout)
-        hint = "the files that the command wrote are in place"
+        hint = "the files that the command wrote are complete"
         return _fail(MachineError(f"the output cannot be printed: {error.strerror}", "stdout", hint), as_json=False)
 
 
@@ -163,7 +163,7 @@ def _run(given: list[str], ended: Ended) -> int:
         return InputError.code if not given else code if isinstance(code, int) else 0
     except GonioError as error:
         return _fail(error, as_json)
-    except KeyboardInterrupt:  # outside the code where Typer catches it
+    except KeyboardInterrupt:  # raised outside the code in which Typer catches it
         print(ended.line, file=sys.stderr)
         return ended.code
     except (BrokenPipeError, streams.OutputError):
@@ -175,8 +175,8 @@ def _run(given: list[str], ended: Ended) -> int:
 
 
 def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
-    """Print an unexpected error, as a fault of the user's code or else of Gonio, and return its exit code. If a signal
-    has arrived, such as in the middle of an import, report the signal instead."""
+    """Print an unexpected error, as an error in the user's code or a bug in Gonio, and return its exit code. If a
+    signal has arrived, for example during an import, report the signal instead."""
     if ended.number:
         print(ended.line, file=sys.stderr)
         return ended.code
@@ -190,9 +190,9 @@ def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
         reason = error.strerror or type(error).__name__
         return _fail(InputError(f"cannot be used: {reason}", os.fsdecode(error.filename), "check the file"), as_json)
     if isinstance(error, MemoryError):
-        return _fail(MachineError("out of memory", "", "ask for less, such as a smaller --size"), as_json)
+        return _fail(MachineError("out of memory", "", "reduce the amount of data, such as --size"), as_json)
     what = f"Gonio failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}"
-    failure = GonioError(what, "", "this is a bug in Gonio; run `gonio --debug ...` and report what it prints")
+    failure = GonioError(what, "", "this is a bug in Gonio; run `gonio --debug ...` and report its output")
     failure.code = 3
     return _fail(failure, as_json)
 

@@ -1,10 +1,10 @@
-"""Shell completion without loading Dr.Jit: materials, presets, laws, languages, ..."""
+"""Shell completion of the names of materials, presets, laws, languages and more, without loading Dr.Jit."""
 
 from __future__ import annotations
 
 import typer
 
-Offers = list[tuple[str, str]]  # words, each with a description
+Offers = list[tuple[str, str]]  # completions, each with a description
 
 
 def materials(incomplete: str) -> Offers:
@@ -40,7 +40,7 @@ def laws(incomplete: str) -> Offers:
 
 
 def presets(context: typer.Context, incomplete: str) -> Offers:
-    """The presets of the material named earlier on the line, or of all materials if none is."""
+    """The presets of the material named earlier on the command line or, if none is named, of all materials."""
     from ..material import models
 
     first = next(iter(context.params.values()), None)

@@ -1,5 +1,5 @@
-"""Options and arguments that several verbs share, each declared once: individually, or in a group that a verb takes as
-one parameter."""
+"""Options and arguments shared by several verbs. Each is declared once, individually or in a group that is a single
+parameter of a verb."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def output_option(metavar: str, text: str) -> OptionInfo:
 
 
 def samples_option(text: str) -> OptionInfo:
-    """`--samples`, the number of random samples of anything except pixels."""
+    """`--samples`, the number of random samples of a quantity other than a pixel."""
     return Option("--samples", metavar="N", help=text)
 
 
@@ -63,7 +63,7 @@ Spp = Annotated[int | None, render_option("spp")]
 Exposure = Annotated[str, render_option("exposure")]
 Timeout = Annotated[
     float | None,
-    Option(metavar="S", help="Time limit in seconds; the picture rendered up to then is written."),
+    Option(metavar="S", help="Time limit in seconds, after which the current picture is written."),
 ]
 Checkpoint = Annotated[
     Path | None, Option(metavar="FILE", help="File for intermediate results; if it exists, the render resumes from it.")
@@ -72,10 +72,10 @@ Checkpoint = Annotated[
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 class Options:
-    """Base class of groups of options: annotated fields, each with a default.
+    """Base class of groups of options, which are annotated fields with defaults.
 
-    It works like a dataclass, but without generated methods: compiling those of twelve groups took a tenth of the time
-    of `gonio --help`.
+    It is a substitute for a dataclass without generated methods: compiling those of twelve groups took a tenth of the
+    time of `gonio --help`.
     """
 
     def __init__(self, **values: object) -> None:
@@ -107,8 +107,8 @@ class Reading(Options):
     ] = None
 
     def shaders(self, texts: Sequence[str]) -> list[str]:
-        """The materials as strings, in which the names of shaders include `define` and `adapter`. Raises InputError if
-        these are given without a shader."""
+        """The materials as strings, with `define` and `adapter` added to the names of shaders. Raises InputError if
+        these options are given without a shader."""
         from ..catalog import shaders
         from ..errors import InputError
 
@@ -143,8 +143,8 @@ class Material(Reading):
     ] = ""
 
     def texts(self, models: Sequence[str], accepted: Collection[operands.Kind] = ()) -> list[str]:
-        """The materials as strings, such as "conductor(preset=Au,alpha=0.3)". A parameter is set on every material that
-        has it.
+        """The materials as strings, such as "conductor(preset=Au,alpha=0.3)". Each parameter is set for every material
+        that has it.
 
         accepted  the accepted kinds of operands; if empty, only materials
         Raises InputError for an operand of another kind, and for a parameter that no material has.
@@ -181,8 +181,8 @@ class Material(Reading):
             raise InputError(what, "--param", "name a material, such as conductor, or leave the parameters out")
 
     def instead_of(self, scene: str, allow_code: bool = False) -> notation.Settings | None:
-        """The material given in place of a scene, such as "ward.py:Ward" or "conductor(preset=Au)"; None if it is a
-        scene. Raises InputError for parameters without a material."""
+        """The material given in place of a scene, such as "ward.py:Ward" or "conductor(preset=Au)"; None if a scene is
+        given. Raises InputError for parameters without a material."""
         from ..catalog import notation, operands
 
         if operands.kind_of(scene, {operands.Kind.SCENE, *operands.MATERIALS}, "SCENE") in operands.MATERIALS:
@@ -198,12 +198,12 @@ def _text(head: str, settings: Mapping[str, str], own: str = "") -> str:
 
 
 class Fitting(Material):
-    """Options that determine which parameters of a model are fitted: `param` and `preset` fix values, `free` frees
-    further ones."""
+    """Options that determine which parameters of a model are fitted: `param` and `preset` fix parameters, and `free`
+    selects additional parameters to fit."""
 
     free: Annotated[
         list[str] | None,
-        Option(metavar="NAME", help="Parameter to fit, even if it is a scale factor of 1; repeatable."),
+        Option(metavar="NAME", help="Additional parameter to fit, such as a scale factor of 1; repeatable."),
     ] = None
     grazing: Annotated[
         float, Option(metavar="DEG", help="Largest angle from the normal, in degrees; values beyond it are ignored.")
@@ -232,18 +232,16 @@ class Fitting(Material):
 
 
 class Executor(Options):
-    """Options that determine where parts are computed: in this process, in several processes on this machine, or on a
-    cluster."""
+    """Options that determine where the parts of a job are computed: in this process, in several processes on this
+    machine, or on a cluster."""
 
-    workers: Annotated[int | None, Option(metavar="N", help="Number of processes to compute with on this machine.")] = (
-        None
-    )
+    workers: Annotated[int | None, Option(metavar="N", help="Number of worker processes on this machine.")] = None
     cluster: Annotated[
-        str | None, Option(metavar="ADDRESS", help="Address of a Dask cluster to compute on, such as tcp://host:8786.")
+        str | None, Option(metavar="ADDRESS", help="Address of the Dask cluster to use, such as tcp://host:8786.")
     ] = None
 
     def running(self) -> AbstractContextManager[object]:
-        """A context manager inside whose `with` block the parts are computed there."""
+        """A context manager; within its `with` block, the parts of a job are computed by the selected processes."""
         if self.workers is None and self.cluster is None:
             return nullcontext()
         from ..work.cluster import Cluster
@@ -252,7 +250,7 @@ class Executor(Options):
 
 
 class Rendering(RenderOptions, Options):
-    """The options of a render as the command line takes them: size and exposure are strings until `request`."""
+    """The options of a render on the command line, where size and exposure are strings; `request` converts them."""
 
     def request(
         self,
@@ -280,7 +278,7 @@ class Rendering(RenderOptions, Options):
         )
 
 
-# size and exposure are parsed by `request`, whose errors say more than Typer's
+# size and exposure are parsed by `request`, whose error messages are more specific than those of Typer
 _TEXTS: dict[str, object] = {"size": str | None, "exposure": str}
 Rendering.__annotations__ = {
     field.name: Annotated[_TEXTS.get(field.name, get_args(_declared()[field.name])[0]), render_option(field.name)]

@@ -1,4 +1,4 @@
-"""Output of the verbs: a progress bar, tables, warnings."""
+"""Output of the verbs: progress bar, tables and warnings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ def print_warnings(warnings: tuple[str, ...]) -> None:
 
 
 class Bar:
-    """A progress bar on stderr: samples done, rate, time left; hidden if stderr is not a terminal."""
+    """A progress bar on stderr that shows the completed samples, the rate and the remaining time. It is hidden if
+    stderr is not a terminal."""
 
     def __init__(self, title: str, total: float | None = None) -> None:
         from rich.console import Console
@@ -59,7 +60,7 @@ class Bar:
         self.step(progress.done, progress.wanted, state)
 
     def step(self, done: int, total: int, state: str) -> None:
-        with contextlib.suppress(OSError):  # a closed terminal must not cost the picture
+        with contextlib.suppress(OSError):  # if the terminal is closed, the picture must still be written
             self._bar.update(self._task, total=total, completed=done, state=state)
 
     def tell(self, text: str) -> None:
@@ -69,7 +70,7 @@ class Bar:
 
     def stopping(self) -> None:
         with contextlib.suppress(OSError):
-            self._console.print("ending in a moment; Ctrl-C again to end at once")
+            self._console.print("ending after the current pass; press Ctrl-C again to end immediately")
 
 
 def listing(*headings: str) -> Table:
@@ -84,7 +85,7 @@ def listing(*headings: str) -> Table:
 
 
 def print_intervals(names: Sequence[str], values: Iterable[float], intervals: Iterable[tuple[float, float]]) -> None:
-    """Print fitted values with their 95 % intervals."""
+    """Print fitted values with their 95 % confidence intervals."""
     table = listing("", "value", "95 % interval")
     for name, value, (low, high) in zip(names, values, intervals, strict=True):
         table.add_row(name, f"{value:.5g}", f"{low:.5g} to {high:.5g}")
@@ -92,12 +93,12 @@ def print_intervals(names: Sequence[str], values: Iterable[float], intervals: It
 
 
 def print_rich(what: RenderableType) -> None:
-    """Print with colors; brackets are text, never markup."""
+    """Print with colors; brackets are printed as text, not interpreted as markup."""
     console(markup=False).print(what)
 
 
 def console(markup: bool = True) -> Console:
-    """A console on standard output, as wide as the terminal; without a terminal it has 200 columns."""
+    """A console on standard output with the width of the terminal, or 200 columns without a terminal."""
     from rich.console import Console
 
     return Console(markup=markup, emoji=False, width=None if sys.stdout.isatty() else 200)

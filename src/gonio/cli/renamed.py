@@ -1,7 +1,7 @@
-"""Former spellings of options: each works for one release, with a warning that names the present one.
+"""Former names of options. Each works for one release, with a warning that states the current name.
 
-`FORMER` is the only list of them. They do not appear in the help, in shell completion or in the tables per verb of
-docs/options.md. Delete this module after one release.
+All former names are listed in `FORMER`. They do not appear in the help, in shell completion or in docs/options.md.
+Delete this module after one release.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ def _folder(path: str) -> str:
 
 
 class Former(NamedTuple):
-    """A former spelling and its replacement: each is an option of a verb, or an argument, in capitals."""
+    """A former name and its replacement. Each is an option of a verb or, in capital letters, an argument."""
 
     verb: str
     old: str
     new: str
-    convert: Callable[[str], str] = str  # converts a value to the form that the present spelling takes
+    convert: Callable[[str], str] = str  # converts a value to the form that the current option accepts
 
 
 FORMER = (
@@ -45,7 +45,7 @@ FORMER = (
 
 
 def warn(verb: str, old: str) -> None:
-    """Warn on stderr about a former spelling, with the present one."""
+    """Print a warning about a former name to stderr, with the current name."""
     former = next(one for one in FORMER if (one.verb, one.old) == (verb, old))
     example = "DIR/" if former.convert is _folder else ""
     new = f"{former.new} {example}".rstrip() if former.new.startswith("-") else f"the argument {former.new}"
@@ -53,7 +53,7 @@ def warn(verb: str, old: str) -> None:
 
 
 def accept(parser: Any, verb: str) -> None:
-    """Let the option parser of a verb accept the former spellings too."""
+    """Make the option parser of a verb accept the former names, too."""
     for former in FORMER:
         if former.verb == verb:
             option = _FormerOption(former, parser)
@@ -66,7 +66,7 @@ def accept(parser: Any, verb: str) -> None:
 
 
 def _accept_argument(parser: Any, option: _FormerOption) -> None:
-    """Let the parser accept one word more than the verb has arguments; the last word is the option's value."""
+    """Make the parser accept one more positional argument than the verb declares, as the value of the option."""
     process = parser._process_args_for_args
 
     def process_with_former(state: Any) -> None:
@@ -80,7 +80,7 @@ def _accept_argument(parser: Any, option: _FormerOption) -> None:
 
 
 class _FormerOption:
-    """An option of the parser under its former spelling, which passes its value to the present one."""
+    """An option of the parser under its former name, which passes its value to the current option."""
 
     takes_value = True
     nargs = 1

@@ -1,7 +1,7 @@
-"""End the command on a signal: by Ctrl-C, from batch systems and from closing terminals.
+"""End the command on a signal: on Ctrl-C, or on a signal from a batch system or a closing terminal.
 
-A render stores its picture and handles signals itself (`render.passes.Interrupts`). All other commands end with one
-line.
+A render handles signals itself and stores its picture (`render.passes.Interrupts`). All other commands print one line
+and end.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 from types import FrameType
 
-# SIGTERM comes from batch systems and `kill`, SIGHUP from a terminal that closes; Windows lacks some.
+# SIGTERM is sent by batch systems and `kill`, SIGHUP by a closing terminal; Windows lacks some of these signals.
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -34,7 +34,7 @@ class Ended:
 
     @property
     def line(self) -> str:
-        files = sys.modules.get("gonio.files")  # a module that was not imported has written nothing
+        files = sys.modules.get("gonio.files")  # if this module is not imported, nothing has been written
         written = ", ".join(str(path) for path in files.written) if files else ""
         what = f"written before: {written}" if written else "nothing was written"
         return f"ended by {words(self.number or signal.SIGINT)}; {what}"
@@ -46,8 +46,8 @@ class Ended:
 
 @contextlib.contextmanager
 def at_once() -> Iterator[None]:
-    """Let signals end the process with one line inside the `with` block: an import that is interrupted by an exception
-    can crash, or look like a missing module."""
+    """Make signals end the process with one line inside the `with` block: an import that is interrupted by an exception
+    can crash or appear as a missing module."""
 
     def end(number: int, frame: FrameType | None) -> None:
         with contextlib.suppress(OSError):
@@ -60,7 +60,8 @@ def at_once() -> Iterator[None]:
 
 @contextlib.contextmanager
 def as_exceptions() -> Iterator[Ended]:
-    """Let signals raise KeyboardInterrupt inside the `with` block, so that partial files and children are removed."""
+    """Make signals raise KeyboardInterrupt inside the `with` block, so that partial files are removed and child
+    processes end."""
     ended = Ended()
 
     def end(number: int, frame: FrameType | None) -> None:
@@ -73,13 +74,13 @@ def as_exceptions() -> Iterator[Ended]:
 
 @contextlib.contextmanager
 def _handled(end: signal._HANDLER) -> Iterator[None]:
-    """Handle signals with `end` inside the `with` block; ignored signals, as under nohup, stay ignored."""
+    """Handle signals with `end` inside the `with` block. Signals that are ignored, as under nohup, remain ignored."""
     before = {}
     try:
         for number in ENDING:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 before[number] = signal.signal(number, end)
-    except ValueError:  # not the main thread, and only that one receives signals
+    except ValueError:  # not the main thread, which is the only thread that receives signals
         pass
     try:
         yield

@@ -1,4 +1,4 @@
-"""Standard streams that are open and can print any file name."""
+"""Preparation of the standard streams: closed streams are opened, and any file name can be printed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TextIO
 
 
 class OutputError(OSError):
-    """The standard output cannot be written: the disk is full, or the output is closed."""
+    """The standard output cannot be written, because the disk is full or the output is closed."""
 
 
 class _Output(io.TextIOWrapper):
@@ -37,8 +37,8 @@ def _told(error: OSError) -> OSError:
 def prepare() -> None:
     """Open standard streams that are closed, as by `>&-`, and print invalid text in file names as raw bytes.
 
-    Otherwise the next file that is opened would become the standard output and receive what is printed. Printing to a
-    closed output fails, as on a full disk.
+    Otherwise, the next file to be opened would become the standard output, and output would be printed to it. Printing
+    to a closed output fails, as on a full disk.
     """
     for number, mode in ((0, os.O_RDONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
         try:
@@ -55,9 +55,9 @@ def prepare() -> None:
 
 
 def _stream(stream: TextIO | None, own: TextIO | None, number: int, kind: type[io.TextIOWrapper]) -> TextIO:
-    """A stream that prints to a file descriptor, in place of a closed one or Python's own.
+    """A stream that prints to a file descriptor, in place of a closed stream or Python's own.
 
-    Any other stream is returned as it is: a second wrapper would close its buffer when garbage-collected.
+    Any other stream is returned unchanged: a second wrapper would close its buffer when garbage-collected.
     """
     if stream is None:
         raw = io.BufferedWriter(io.FileIO(number, "w", closefd=False))
@@ -82,7 +82,7 @@ def _replaced(error: UnicodeError) -> tuple[str | bytes, int]:
 
 
 def silence(*streams: TextIO) -> None:
-    """Discard what is buffered in the streams and everything that is printed to them later."""
+    """Discard all buffered and future output of the streams."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in streams:
         os.dup2(nowhere, stream.fileno())

@@ -1,6 +1,6 @@
 """Energy: directional albedo, tables of E and E_avg, and the compensation of energy lost by single scattering.
 
-Everything here applies to any base material and is independent of scenes.
+All of this code applies to any base material and is independent of scenes.
 """
 
 from .albedo.directional import Albedo, albedo

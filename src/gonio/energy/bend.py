@@ -1,10 +1,11 @@
-"""Transforms of mu that make albedo smooth despite masking, for polynomials of the missing energy and for axes.
+"""Transforms of mu in which the albedo is smooth despite masking, for polynomials of the missing energy and for the
+axes of tables.
 
 Masking is strong where mu is below a few alpha. With a bend b of a few alpha and
 
     u(mu) = mu^p (1 + b^p) / (mu^p + b^p),   r = u^(1 / 2^n),   z = 1 - r        (p, n, b: see `FORMS`)
 
-albedo is a smooth function of z in [0, 1] for any width, down to the limit alpha -> 0.
+the albedo is a smooth function of z in [0, 1] for any alpha, down to the limit alpha -> 0.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from ..ops.backend import Array
 from ..optics.masking import term
 from ..optics.ndf import distribution
 
-DEGREE = 10  # error 7e-5 (Smith, schlick-direct), 2e-4 (schlick-ibl), 4e-4 (Beckmann's rational fit, due to its jump)
-MIN_POWER = 1e-33  # of r, and the inverse of the maximum of z / r: the range of float32 is 1e-38 to 3e38
+DEGREE = 10  # errors: 7e-5 (Smith, schlick-direct), 2e-4 (schlick-ibl), 4e-4 (Beckmann's rational fit, due to its jump)
+MIN_POWER = 1e-33  # smallest power of r, and the inverse of the largest z / r: float32 ranges from 1e-38 to 3e38
 
 
 class Form(NamedTuple):
-    """A transform of mu, and the degree of the polynomials in it.
+    """A transform of mu, and the degree of the polynomials in the transformed variable.
 
     squarings     p = 2^squarings
     roots         n
@@ -40,15 +41,16 @@ class Form(NamedTuple):
 
     @property
     def least(self) -> float:
-        """The mu / b below which M is constant, because powers of r and z / r would leave the range of float32."""
+        """The value of mu / b below which M is constant, because powers of r and z / r would exceed the range of
+        float32."""
         return MIN_POWER ** (2.0 ** (self.roots - self.squarings) / self.degree)
 
 
-# Chosen for the smallest error of the fit.
+# chosen to minimize the error of the fit
 FORMS = {
     "schlick": Form(0, 0, 2.0),
     "ggx": Form(0, 0, 2.0, 6.0),
-    "narrow": Form(2, 2, 4.0),  # other distributions: nothing is missing beyond a few alpha from grazing
+    "narrow": Form(2, 2, 4.0),  # other distributions: no energy is missing where mu exceeds a few alpha
     # glass also has a knee at the critical angle
     "schlick-glass": Form(0, 0, 2.0, degree=14),
     "thin-ggx": Form(0, 1, 2.0, degree=14),
@@ -70,12 +72,12 @@ def form_of(ndf: str, masking: str, side: str = "") -> Form:
 
 
 def knee(form: Form, masking: str, alpha: Scalar) -> Scalar:
-    """The bend b of a form at a width: the cosine below which masking is strong."""
+    """The bend b of a form for a given alpha: the cosine below which masking is strong."""
     return _bend(form, term(masking).onset(alpha))
 
 
 def numpy_knee(form: Form, masking: str, alpha: np.ndarray) -> np.ndarray:
-    """`knee` for a NumPy array of widths."""
+    """`knee` for a NumPy array of alphas."""
     onset: Array = term(masking).onset(ops.backend.types("float64").float(np.ravel(alpha)))
     return _bend(form, np.asarray(onset.numpy()).reshape(np.shape(alpha)))
 
@@ -94,7 +96,7 @@ def descent(form: Form, mu: Array, bend: Array) -> Array:
         mu, bend = sqr(mu), sqr(bend)
     ratio = bend * fall / (mu * (1.0 + bend))  # (1 - u) / u
     for _ in range(form.roots):
-        ratio = ratio / (1.0 + sqrt(1.0 + ratio))  # the same for the root of u
+        ratio = ratio / (1.0 + sqrt(1.0 + ratio))  # the corresponding value for the root of u
     return ratio
 
 

@@ -1,8 +1,9 @@
-"""A cache of computed tables in the user's cache folder, keyed by a hash of their inputs.
+"""A cache of computed tables in the user's cache folder; the keys are hashes of their inputs.
 
 The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. The name of a file is the hash of the
-request and of the formulas involved; the file contains the hash of its content. A truncated, altered or foreign file,
-or one that another user can change, is rebuilt with a warning. A folder that cannot be written is ignored.
+request and of the formulas involved; the file contains the hash of its content. If a file is truncated, altered or
+foreign, or if another user can change it, it is rebuilt with a warning. If the folder is not writable, nothing is
+stored.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ PACKAGES = ("energy", "material", "materials", "ops", "optics")  # packages whos
 
 @lru_cache
 def formulas() -> str:
-    """Hash of the code of `PACKAGES` without comments and docstrings, which makes a changed formula lead to new tables.
+    """Hash of the code of `PACKAGES` without comments and docstrings, so that tables are computed again if a formula
+    has changed.
 
     Parsing takes a tenth of a second, so the hash is cached until a file changes.
     """
@@ -66,7 +68,8 @@ def formulas() -> str:
 
 
 def _store(path: Path, content: bytes) -> None:
-    """Write a file of the cache, or nothing if the folder is read-only, which costs only time."""
+    """Write a file of the cache. If the folder is read-only, nothing is written, and the table is computed again
+    later."""
     with contextlib.suppress(OSError, GonioError):
         path.parent.mkdir(parents=True, exist_ok=True)
         files.write_whole(path, content, rescue=False)
@@ -84,12 +87,12 @@ def _meaning(source: str) -> str:
     return ast.dump(tree, annotate_fields=False)
 
 
-FAMILIES: tuple[Family[Any], ...] = (NDF.family, Masking.family, Fresnel.family)  # members that determine tables
+FAMILIES: tuple[Family[Any], ...] = (NDF.family, Masking.family, Fresnel.family)  # their members determine tables
 
 
 def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
     """Memoize a function of the names of a distribution, a masking term and a Fresnel kind, in this order. The result
-    is recomputed if a name refers to another member than before."""
+    is recomputed if a name refers to a different member than before."""
     made: dict[tuple[object, ...], Kept] = {}
 
     @functools.wraps(build)
@@ -113,7 +116,7 @@ def _hash_of(cls: type) -> str:
     try:
         files = with_imports(Path(inspect.getsourcefile(cls) or ""))
         return hashlib.sha256(b"".join(file.read_bytes() for file in sorted(files))).hexdigest()
-    except (OSError, TypeError):  # defined at a prompt
+    except (OSError, TypeError):  # defined at an interactive prompt
         return f"{cls.__qualname__} {id(cls)} {_PROCESS}"
 
 
@@ -121,7 +124,7 @@ _PROCESS = f"{os.getpid()} {time.time_ns()}"
 
 
 def _path(key: tuple) -> tuple[Path, str]:
-    """The file and the full name for a key, whose first entry is the type of the content."""
+    """The file and the full name that belong to a key, whose first entry is the type of the content."""
     name = hashlib.sha256((repr(key) + formulas()).encode()).hexdigest()
     return folder() / f"{key[0]}-{name[:32]}.npz", name
 
@@ -131,8 +134,8 @@ def keep(key: tuple, build: Callable[[], Kept], write: Callable[[Kept], bytes], 
 
     key    all inputs except the formulas of `PACKAGES`, which are added
     build  function that computes the object
-    write  function from the object to the bytes to store
-    read   function from a file to the object; it raises ValueError if the file was not written by `write`
+    write  function that converts the object to the bytes to store
+    read   function that reads the object from a file; it raises ValueError if the file was not written by `write`
     """
     path, _ = _path(key)
     if os.path.isfile(path):

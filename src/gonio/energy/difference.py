@@ -1,11 +1,11 @@
-"""The difference between two materials: in f, over pairs of directions, and in albedo.
+"""The difference between two materials, in f over pairs of directions and in albedo.
 
     result = difference(go.OrenNayar(sigma=0.5), go.Lambert())
     result.mean, result.largest, result.largest_at
 
-f is compared at directions sampled by each material and by the cosine, a third each, so that narrow lobes are covered;
-each pair is weighted by the inverse density of this mixture. Perfectly specular components have no f and contribute
-only to the albedo.
+f is compared at directions of which a third each are sampled from the two materials and from the cosine, so that narrow
+lobes are covered; each pair is weighted by the inverse density of this mixture. Perfectly specular components have no f
+and contribute only to the albedo.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from .albedo import albedo, direction
 
 Floats = NDArray[np.float64]
 VIEWS = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0)  # degrees of wo
-AZIMUTHS = 8  # per view, if a material is anisotropic
-PAIRS = 1 << 14  # directions of light per view
-GRAZING = 0.03  # smallest cosine of wi: f = eval / cos loses its digits within 1.7 degrees of the horizon
-FAINT = 0.01  # fraction of the mean f at a view below which a ratio is not visible
+AZIMUTHS = 8  # azimuths per view, if a material is anisotropic
+PAIRS = 1 << 14  # directions wi per view
+GRAZING = 0.03  # smallest cosine of wi: f = eval / cos is inaccurate within 1.7 degrees of the horizon
+FAINT = 0.01  # fraction of the mean f of a view below which a relative difference is not visible
 METRICS = {
     "mean": "int |f_A - f_B| cos over int f_B cos, averaged over views",
     "largest": "the largest |f_A - f_B| over the larger of both, if either is over 1 % of the mean",
@@ -35,7 +35,7 @@ METRICS = {
 
 @dataclass(frozen=True)
 class View:
-    """The comparison at one angle of wo.
+    """The results of the comparison at one angle of wo.
 
     theta    angle between wo and the normal, degrees
     mean     int |f_A - f_B| cos d wi divided by int f_B cos d wi, averaged over the channels; inf if B is black
@@ -55,10 +55,10 @@ class View:
 
 @dataclass(frozen=True)
 class Difference:
-    """The comparison of two materials.
+    """The results of the comparison of two materials.
 
     views         the results at each angle of wo
-    known         the angles at which both materials are known; only these are compared
+    known         the angles at which the values of both materials are known; only these are compared
     has_specular  whether either material has perfectly specular components, which contribute only to the albedo
     metric        the metric to which the tolerance applies, one of METRICS
     tolerance     the largest value of the metric that passes; if None, any value passes
@@ -126,13 +126,13 @@ class Difference:
 def difference(
     a: BSDF, b: BSDF, metric: str = "mean", tolerance: float | None = None, pairs: int = PAIRS, seed: int = 1
 ) -> Difference:
-    """Compare f and the albedo of a material A with those of B, at the angles at which both are known.
+    """Compare f and the albedo of a material A with those of B, at the angles at which the values of both are known.
 
     metric     the metric to which the tolerance applies, one of METRICS
     tolerance  the largest value of the metric that passes; if None, any value passes
     pairs      number of directions wi per view
     seed       seed of these directions
-    Returns a `Difference`. Raises InputError for an unknown metric, or if at no view both materials are known.
+    Returns a `Difference`. Raises InputError for an unknown metric, or if there is no angle at which both are known.
     """
     if metric not in METRICS:
         raise InputError(f"unknown metric '{metric}' for materials", "--metric", " | ".join(METRICS))
@@ -179,8 +179,8 @@ def _view(
 
 
 def _directions(a: BSDF, b: BSDF, wo: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Directions wi, a third from each material and from the cosine, and the density of this mixture. The density is 0
-    for samples of perfectly specular components."""
+    """Directions wi, of which a third each are sampled from the two materials and from the cosine, and the density of
+    this mixture. The density is 0 for samples of perfectly specular components."""
     u = rng.random((len(wo), 3))
     both = a.transmits or b.transmits
     side = np.where(both & (u[:, 0] < 0.5), -1.0, 1.0)

@@ -1,1 +1,1 @@
-"""Fit materials to measurements: `data` (fitted values), `parameters` (free parameters), `solver`, `fit`."""
+"""Fits of materials to measurements: `data` (measured values), `parameters` (free parameters), `solver`, `fit`."""

@@ -100,10 +100,11 @@ def run(
     report: Callable[[int, int, str], None] = lambda done, total, text: None,
     notice: Callable[[str], None] = lambda text: None,
 ) -> list[Row]:
-    """Fit each model to each file. An error is raised for a single file; with several files it goes into `failed`.
+    """Fit each model to each file. With a single file, an error is raised; with several files, it is stored in
+    `failed`.
 
     report  called before each file with the number of finished files, the number of all files, and the file's name
-    notice  called at the start with a notice if an earlier run already fitted some of the files
+    notice  called at the start with a message if an earlier run has already fitted some of the files
     """
     settings = settings or Settings()
     how = (tuple(models), *settings.key)
@@ -136,7 +137,7 @@ def run(
 
 
 def _key(how: tuple[object, ...], file: str) -> str:
-    """Cache key of a fit: its settings and the size and time stamp of the file."""
+    """Cache key of a fit: its settings, and the size and time stamp of the file."""
     path = Path(os.path.expanduser(file.rpartition(":")[0] if not Path(file).exists() and ":" in file else file))
     try:
         state = path.stat()

@@ -1,4 +1,4 @@
-"""Uncertainty of fitted values: the sandwich estimator over runs of neighbors, and undetermined directions."""
+"""Uncertainty of fitted values: the sandwich estimator over runs of neighboring values, and undetermined directions."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from numpy.typing import NDArray
 from ..measure.tables.base import Floats
 from .solver import BLOCK, Linearized
 
-NULL = 1e-8  # relative to the largest eigenvalue: float32 derivatives have relative errors of 1e-6
+NULL = 1e-8  # eigenvalue that counts as 0, relative to the largest: float32 derivatives have relative errors of 1e-6
 PART = 1e-3  # squared component of a unit vector above which a parameter always belongs to the direction
 LEAST = 1e-6  # squared component below which it never does
 ROUNDED = 1e-6  # relative error of J^T J
 
 
 def undetermined_groups(hessian: Floats) -> list[list[int]]:
-    """Indices of undetermined parameters, grouped if the data determine only a combination, from J^T J (K, K).
+    """Groups of indices of undetermined parameters, from J^T J (K, K): single parameters, or several of which the data
+    determine only a combination.
 
     They have components in the null space of J^T J, with parameters scaled to a unit diagonal; an eigenvalue counts as
-    0 if it is within the rounding error of float32 derivatives. That error also rotates the null space, by its ratio to
-    the next eigenvalue: a component within this angle, or below LEAST, counts as 0.
+    0 if it is within the rounding error of float32 derivatives. The error also rotates the null space, by an angle that
+    is its ratio to the next eigenvalue: a component within this angle, or below LEAST, counts as 0.
     """
     size = np.sqrt(np.maximum(np.diag(hessian), 0.0))
     s = np.where(size > 0.0, size, 1.0)
@@ -75,9 +76,9 @@ class Certainty:
 
     @property
     def coupling(self) -> Floats:
-        """Correlation matrix for independent errors of equal size, (K, K): how well the data distinguish parameters. A
-        misfit that several parameters share correlates their values, but does not couple them. 0 for undetermined
-        parameters, whose entries in the pseudoinverse are rounding errors."""
+        """Correlation matrix for independent errors of equal size, (K, K), a measure of how well the data distinguish
+        parameters. A misfit that affects several parameters correlates their values but does not change this matrix.
+        Entries of undetermined parameters are 0, because their entries in the pseudoinverse are rounding errors."""
         return _correlation(np.where(np.isfinite(np.diag(self.covariance)), self.inverse, 0.0))
 
 
@@ -91,7 +92,7 @@ def _correlation(covariance: Floats) -> Floats:
 
 
 def information(parts: Sequence[Linearized], rows: NDArray[np.int64], count: int) -> tuple[Floats, Floats]:
-    """(J^T J (K, K), scores J^T r of each run (R, K)) for residuals in parts.
+    """(J^T J (K, K), scores J^T r of each run (R, K)) for residuals that are given in parts.
 
     rows   index of the run of neighbors that each residual belongs to
     count  number of parameters K
@@ -108,11 +109,12 @@ def information(parts: Sequence[Linearized], rows: NDArray[np.int64], count: int
 
 
 def degrees_of_freedom(parts: Sequence[Linearized], rows: NDArray[np.int64], inverse: Floats) -> Floats:
-    """Effective degrees of freedom of the standard errors of `certainty`, (K,): how many runs determine a parameter.
+    """Effective degrees of freedom of the standard errors of `certainty`, (K,): the number of runs that determine a
+    parameter.
 
-    The variance of a parameter is estimated by a sum over runs, each about e_g chi^2 with one degree of freedom, where
-    e_g is the run's contribution to the variance for independent errors of equal size. The sum is about chi^2 with
-    (sum e_g)^2 / sum e_g^2 degrees of freedom (Satterthwaite1946).
+    The variance of a parameter is estimated by a sum over runs. Each term is approximately e_g times a chi^2 variable
+    with one degree of freedom, where e_g is the run's contribution to the variance for independent errors of equal
+    size. The sum is approximately chi^2 with (sum e_g)^2 / sum e_g^2 degrees of freedom (Satterthwaite1946).
 
     rows     index of the run of neighbors that each residual belongs to
     inverse  inverse of J^T J, (K, K)
@@ -132,8 +134,8 @@ def degrees_of_freedom(parts: Sequence[Linearized], rows: NDArray[np.int64], inv
 def certainty(hessian: Floats, scores: Floats) -> Certainty:
     """Sandwich estimate of the covariance, valid for errors of any size that are correlated within a run (Liang1986).
 
-    Every parameter along an undetermined direction gets infinite variance; the pseudoinverse, 0 along that direction,
-    would report the variance of some combination instead.
+    Every parameter along an undetermined direction has infinite variance. The pseudoinverse, which is 0 along that
+    direction, would yield the variance of some combination instead.
 
     hessian  J^T J, (K, K)
     scores   J^T r of each run, (R, K)

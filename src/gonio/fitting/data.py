@@ -1,4 +1,4 @@
-"""Data of a fit: pairs of directions with measured values."""
+"""The data of a fit: pairs of directions with measured values."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ..measure.tables.base import Floats, Measurement, in_rgb
 from ..measure.tables.half_difference import HalfDifference, centres
 from ..measure.tables.samples import Samples
 
-GRAZING = 80.0  # degrees: measurements beyond are unreliable, and papers exclude them (Ngan2005)
+GRAZING = 80.0  # degrees: measurements at larger angles are unreliable, and papers exclude them (Ngan2005)
 SHARED = 0.01  # fraction of the values equal to the maximum above which the detector counts as saturated
-RUNS = 3  # smallest number of runs of neighbors with the maximum: fewer may be a small table's only peak
-HIGHLIGHT = 4.0  # times the median: a larger maximum belongs to a highlight, not to a diffuse material
+RUNS = 3  # smallest number of runs of neighbors that contain the maximum: fewer may be the only peak of a small table
+HIGHLIGHT = 4.0  # ratio to the median above which a maximum belongs to a highlight, not to a diffuse material
 GRID = (60, 45, 36)  # cells in half-vector and difference angles, for tables without directions of their own
 
 
@@ -29,8 +29,8 @@ class Data:
 
     wo, wi  (N, 3) float64, above the surface
     value   f cos theta_i, (N, 3)
-    row     index of the run of neighbors, (N,): errors of neighbors are correlated
-    out     number of values of the table that are excluded, by reason
+    row     index of the run of neighbors, (N,), within which errors are correlated
+    out     number of excluded values of the table, by reason
     """
 
     wo: Floats
@@ -58,16 +58,16 @@ class Data:
         return Data(self.wo[chosen], self.wi[chosen], self.value[chosen], self.row[chosen], self.out)
 
     def known(self, measured: NDArray[np.bool_]) -> Data:
-        """The measured values; the others count as "not measured"."""
+        """The measured values; the others are counted in `out` as "not measured"."""
         return replace(self.at(measured), out={**self.out, "not measured": int(np.count_nonzero(~measured))})
 
 
 def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Data:
     """The values of a table whose directions both lie within `grazing` degrees of the normal.
 
-    Samples, tables over angles and half-difference tables provide the stored values at their own directions, since
-    interpolated values would count as measurements. Other tables are resampled to a half-difference grid within the
-    measured angles.
+    Samples, tables over angles and half-difference tables provide the stored values at their own directions, because
+    interpolated values would be treated as measurements. Other tables are resampled to a half-difference grid within
+    the measured angles.
 
     where  name of the table, for errors
     Raises InputError if no value remains.
@@ -107,9 +107,9 @@ def _of_cells(table: HalfDifference, grazing: float) -> Data:
 
 
 def _of_pairs(table: Samples | Angles, grazing: float, where: str) -> Data:
-    """The values of a table that stores them for pairs of directions. A run of neighbors has about the same theta_h and
-    theta_d, as in a half-difference table. It includes the swapped pair and the mirror image of each pair, which have
-    the same value in a reciprocal table."""
+    """The values of a table that stores them for pairs of directions. The pairs of a run of neighbors have about the
+    same theta_h and theta_d, as in a half-difference table. A run includes the swapped pair and the mirror image of
+    each pair, which have the same value in a reciprocal table."""
     wo, wi = table.pairs()
     inside = _inside(wo, wi, grazing)
     wo, wi = wo[inside], wi[inside]
@@ -128,8 +128,8 @@ def _resampled(table: Measurement, grazing: float) -> Data:
 
 
 def _saturated(f: Floats, row: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Mask (N,) of saturated values (N, 3): at least `SHARED` of a channel, in `RUNS` or more runs of neighbors, equals
-    its maximum, which is a highlight."""
+    """Mask (N,) of saturated values (N, 3). A channel is saturated if its maximum is a highlight and if at least a
+    fraction `SHARED` of its values, in `RUNS` or more runs of neighbors, are equal to the maximum."""
     saturated = np.zeros(len(f), bool)
     for channel in f.T:
         largest = np.max(channel, initial=0.0, where=np.isfinite(channel))

@@ -34,15 +34,15 @@ from .profiles import LARGE, profiles
 from .solver import METRICS, Problem, Solution, solve
 from .starts import between, starts_of
 
-FEW = 6000  # values on which starting points are compared
-SOME = 60_000  # values on which the best solutions are refined
-SOLVED = 8  # starting points that are refined with the metric itself on few values
-TABULATED = 4  # starting points of a material that computes tables in each step
-ENDS = 3  # solutions that are refined to convergence
+FEW = 6000  # number of values on which starting points are compared
+SOME = 60_000  # number of values on which the best solutions are refined
+SOLVED = 8  # number of starting points that are refined with the metric itself on few values
+TABULATED = 4  # number of starting points for a material that computes tables in each step
+ENDS = 3  # number of solutions that are refined to convergence
 SAME = 1e-4  # relative difference of costs above which two solutions count as distinct
 INSIDE = (0.1, 0.5)  # fractions of a range to which numbers at its ends are moved
 NORMAL_95 = 1.96
-MANY = 1e6  # degrees of freedom above which the distribution counts as normal
+MANY = 1e6  # degrees of freedom above which the distribution is treated as normal
 COLUMNS = ("value", "error", "low", "high")  # columns of a fit as a table
 TIED = 0.98  # correlation above which two parameters are reported
 
@@ -65,10 +65,10 @@ class Fit:
     count        number of fitted values
     notes        remarks on the quality of the fit
     seconds      duration of the fit
-    ranges       (K, 2), the smallest and the largest possible value of each number; None if unbounded
+    ranges       (K, 2), the smallest and the largest allowed value of each number; None if unbounded
     degrees      (K,), effective degrees of freedom of the standard errors; None for many
-    profiles     (K, 2), ends of the 95 % intervals by the profile of the loss where value +- error does not hold, NaN
-                 elsewhere; None if there are none
+    profiles     (K, 2), ends of the 95 % intervals from the profile of the loss where value +- error is not valid, NaN
+                 elsewhere; None if value +- error is valid for all numbers
     """
 
     material: BSDF
@@ -90,7 +90,7 @@ class Fit:
 
     @property
     def half_widths(self) -> Floats:
-        """Half widths of the symmetric 95 % intervals, (K,), by Student's t distribution if few runs of neighbors
+        """Half widths of the symmetric 95 % intervals, (K,), from Student's t distribution if few runs of neighbors
         determine a number."""
         return quantiles(self.degrees) * self.errors
 
@@ -104,7 +104,7 @@ class Fit:
 
     @property
     def determined(self) -> NDArray[np.bool_]:
-        """Whether the data bound a number, (K,)."""
+        """Whether the data constrain each number to a finite interval, (K,)."""
         told = np.isfinite(self.errors)
         return told if self.profiles is None else told | np.isfinite(self.profiles).all(axis=1)
 
@@ -114,8 +114,8 @@ class Fit:
         return notation.written(self.material)
 
     def as_dict(self) -> dict[str, Any]:
-        """Dictionary for JSON; unknown errors are null. `notation` is the material as written in scene files, else
-        null."""
+        """Dictionary for JSON; unknown errors are null. `notation` is the material as written in scene files, or null
+        if it cannot be written there."""
         return {
             "material": self.text,
             "notation": notation.for_files(self.material),
@@ -172,8 +172,8 @@ class Fit:
 
 
 def quantiles(degrees: Floats | None) -> Floats:
-    """Quantile of Student's distribution for 95 % intervals, (K,) or ()."""
-    from scipy import special  # imported late: not every run fits
+    """Quantile of Student's t distribution for 95 % intervals, (K,) or ()."""
+    from scipy import special  # imported here because most runs do not fit anything
 
     return np.asarray(special.stdtrit(MANY if degrees is None else np.minimum(degrees, MANY), 0.975))
 
@@ -198,16 +198,16 @@ def fit(
 
     data      a measurement file, a table, a `go.Measured`, `Data`, or three arrays (wo, wi, f): unit vectors (N, 3)
               above the surface, z up, and the BRDF (N,) or (N, 3) in 1/sr without the cosine
-    model     anything that `go.material` takes, such as the sum "lambert+ggx"; the fit starts from its parameter values
+    model     anything that `go.material` accepts, such as the sum "lambert+ggx"; the fit starts from its parameter
+              values
     lobes     number of copies of the last term of the sum
     loss      "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
     param     path -> value of parameters that stay fixed
     free      paths of additional parameters to fit that are fixed by default: scale factors of 1
     grazing   degrees; values with a direction beyond this angle from the normal are excluded
     progress  called with a message that states the loss, after each start and at the end
-    The solver is Levenberg-Marquardt from several starting points with different lobe widths, first on subsets, finally
-    on all values.
-    Raises InputError for invalid files, models and paths.
+    The solver applies the Levenberg-Marquardt method from several starting points with different lobe widths, first to
+    subsets and finally to all values. Raises InputError for invalid files, models and paths.
     """
     started = time.perf_counter()
     if loss not in METRICS:
@@ -242,8 +242,8 @@ def _table_of(data: object) -> Measurement:
 
 def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:
     """The solution with the lowest cost over all starts. All starts are refined on few values with the logarithmic
-    metric, which is smooth everywhere; the best of these with the metric itself; and the best distinct solutions on all
-    values."""
+    metric, which is smooth everywhere; the best of these are refined with the metric itself, and the best distinct
+    solutions are then refined on all values."""
     data = problem.data.some(FEW)
     few = _with_data(problem, data, problem.name)
     rough = _with_data(problem, data, "log") if problem.name == "relative" else few
@@ -266,10 +266,11 @@ def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], 
 
 
 def _off_bounds(problem: Problem, few: Problem, best: Solution) -> Solution:
-    """A better solution whose numbers leave the ends of their ranges, if there is one.
+    """A better solution whose numbers are not at the ends of their ranges, if there is one.
 
-    An index of refraction of 1 has a slope of 0, so a number that a step puts there never leaves. The numbers at an end
-    are moved inside, one at a time and all together, first on few values.
+    The derivative with respect to an index of refraction is 0 at an index of 1, so a number that a step sets to 1 never
+    changes again. The numbers at an end are moved inside, one at a time and all together, and the fit is repeated,
+    first on few values.
     """
     low, high, _ = ranges(problem.free)
     stuck: list[int] = np.flatnonzero((best.numbers <= low) | (best.numbers >= high)).tolist()
@@ -340,7 +341,7 @@ def notes_on(
     names: tuple[str, ...],
     undetermined: Sequence[Sequence[int]] = (),
 ) -> list[str]:
-    """Remarks that a reader needs to assess the values.
+    """Remarks that help to assess the fitted values.
 
     unknown       whether the data do not determine a parameter, (K,)
     coupling      correlations of the parameters for independent errors
@@ -362,7 +363,7 @@ def notes_on(
     for group in (one for one in connected(size > TIED) if len(one) > 1):
         pair = max(itertools.combinations(group, 2), key=lambda two: size[two])
         which = "correlation" if len(group) == 2 else "largest correlation"
-        notes.append(f"{_listed(names, group)} are tied ({which} {coupling[pair]:.3f}): fix one of them")
+        notes.append(f"{_listed(names, group)} are strongly correlated ({which} {coupling[pair]:.3f}): fix one of them")
     return notes
 
 
@@ -383,7 +384,7 @@ def _notes_on_data(data: Data) -> list[str]:
         )
     for why in ("saturated", "not finite"):
         if why in data.out:
-            notes.append(f"{data.out[why]} of {len(data) + sum(data.out.values())} places are {why} and excluded")
+            notes.append(f"{data.out[why]} of {len(data) + sum(data.out.values())} values are {why} and excluded")
     return notes
 
 

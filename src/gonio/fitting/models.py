@@ -1,4 +1,4 @@
-"""Models to fit: a material by name or a sum of materials, and its free parameters."""
+"""The models that are fitted: a named material or a sum of materials, and its free parameters."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .starts import random_starts
 
 FIXED = {"ggx": ("k",), "beckmann": ("k",)}
 AT_LEAST = {"ggx": {"eta": 1.0}, "beckmann": {"eta": 1.0}}  # eta and 1 / eta have the same reflectance
-GENERIC = 512  # directions at which the effects of parameters are compared
+GENERIC = 512  # number of directions at which the effects of parameters are compared
 
 
 class Model(NamedTuple):
@@ -39,8 +39,8 @@ def modelled(text: str, lobes: int = 1) -> Model:
     """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=0.2)".
 
     lobes  number of copies of the last term of the sum
-    "ggx" and "beckmann" are microfacet lobes of that distribution with Schlick's Fresnel term for an index without
-    absorption, so only eta determines the color.
+    "ggx" and "beckmann" are microfacet lobes with this distribution of normals, with Schlick's Fresnel term and k = 0,
+    so only eta determines the color.
     """
     if lobes < 1:
         raise InputError(f"{lobes} lobes given, at least 1 expected", "lobes")
@@ -53,10 +53,10 @@ def modelled(text: str, lobes: int = 1) -> Model:
         head = part.partition("(")[0]
         material, stated = notation.named(texts.expanded(part))[0], texts.assignments(notation.split(part)[1])
         paths = {leaf.path for leaf in tree.leaves(material)}
-        given = [path for path in stated if path in paths]  # not a preset, whose values are where the fit starts
+        given = [path for path in stated if path in paths]  # not a preset: its values are the starting point
         own = Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {}))
         for path, value in stated.items():
-            if isinstance(getattr(material, path, None), BSDF):  # a material inside: coat(base=lambert+ggx)
+            if isinstance(getattr(material, path, None), BSDF):  # an inner material, as in coat(base=lambert+ggx)
                 own = _with_constraints(own, path, modelled(value))
         made.append(own)
     combined = made[0]
@@ -101,9 +101,9 @@ def without_duplicates(
     """(material, free parameters, notes) without redundant parameters.
 
     If parameters of several parts have the same effect, such as the albedos of two Lambert parts, one of them stays
-    free, or those in `wanted`. The others are fixed at 0 if the first keeps its effect without them, else at their
-    values. Redundancy is detected by the null space of the derivatives at random parameters and random directions,
-    where it can only come from the form of the model.
+    free, or those in `wanted`. The others are fixed at 0 if the first has the same effect without them, else at their
+    current values. Redundancy is detected by the null space of the derivatives at random parameter values and random
+    directions, where it can only be a property of the model.
     """
     parts = {one.path.rpartition(".")[0] for one in moving}
     if len(parts) < 2:
@@ -128,9 +128,9 @@ def without_duplicates(
             rest = [other for other in moving if other.path != path]
             if without is not None and _moves(without, rest, retained):
                 material = without
-                notes.append(f"{path} is held at 0: {retained} has the same effect")
+                notes.append(f"{path} is fixed at 0: {retained} has the same effect")
             else:
-                notes.append(f"{path} is held as it is: {retained} has the same effect")
+                notes.append(f"{path} is fixed at its value: {retained} has the same effect")
             moving = rest
     return material, moving, notes
 

@@ -16,8 +16,8 @@ from ..ops import backend
 
 CHANNELS = 3
 NAMES = ("r", "g", "b")
-WIDE = 30.0  # ranges with a larger ratio of bounds use a logarithmic scale
-SMALLEST = 1e-3  # lower bound of logarithmic parameters whose range begins at 0
+WIDE = 30.0  # ratio of bounds above which a range has a logarithmic scale
+SMALLEST = 1e-3  # lower bound of parameters with a logarithmic scale whose range begins at 0
 M = TypeVar("M", bound=BSDF)
 
 
@@ -28,7 +28,7 @@ class Free:
     path       path in the tree of materials
     kind       "float", "spectrum" or "alpha"
     low, high  bounds of its range
-    ratio      whether the solver steps its logarithm
+    ratio      whether the solver varies the logarithm of the parameter
     """
 
     path: str
@@ -92,7 +92,7 @@ def start_of(material: BSDF, free: list[Free]) -> NDArray[np.float64]:
 
 
 def inner_of(free: list[Free], numbers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values within all ranges, none of them at an end and no two alike; near `numbers` if a range is wide."""
+    """Values inside all ranges, none of them at an end and no two equal; close to `numbers` if a range is wide."""
     low, high, _ = ranges(free)
     reach = np.minimum(high - low, WIDE)
     begin = np.clip(numbers - 0.5 * reach, low, high - reach)

@@ -1,4 +1,5 @@
-"""Intervals from the profile of the sum of squares, where it is not the parabola that standard errors assume.
+"""Confidence intervals from the profile of the sum of squares, for use where the profile is not a parabola, as standard
+errors assume.
 
 The profile of a parameter at x is the smallest sum of squares of all fits in which the parameter is x (Venzon1988). Its
 95 % interval is the set of x at which the profile is less than
@@ -7,10 +8,10 @@ The profile of a parameter at x is the smallest sum of squares of all fits in wh
 
 above the minimum, where t is the quantile of Student's distribution, J is the Jacobian of the residuals, V is the
 covariance of the parameters and s = V_kk / (J^T J)^-1_kk for parameter k. s is the variance of correlated residuals of
-unequal size, relative to that of independent ones of size 1: for a parabola, the ends are value +- t sqrt(V_kk), those
-of the standard error. Profiles that are not parabolas arise from an index of refraction of
-1, where the reflectance has no slope, so that J^T J does not constrain it; from a value at a bound of its range; and
-from a width that the data bound from one side only.
+unequal size, relative to that of independent residuals of size 1: for a parabola, the ends are value +- t sqrt(V_kk),
+as for the standard error. Profiles that are not parabolas arise in three cases: an index of refraction of 1, where the
+derivative of the reflectance is 0, so that J^T J does not constrain the index; a value at a bound of its range; and a
+lobe width for which the data determine only one bound.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ from .certainty import Certainty, connected
 from .parameters import ranges
 from .solver import Residuals, solve
 
-STEPS = 6  # solver steps for each point of a profile, starting at the solution for the previous point
+STEPS = 6  # solver steps per point of a profile, starting at the solution for the previous point
 POINTS = 14  # points of a profile on each side
 NEAR = 0.005  # relative error of the square root of the rise at which an end is accepted
 UNEQUAL = 0.3  # relative difference of the rises at the two ends above which a profile is computed
-FIRST = 0.02  # first step from a value without a finite standard error, relative to its range or the logarithm's unit
-ALIKE = 0.999  # correlation above which parameters count as one: fits along their valley would be slow and useless
+FIRST = 0.02  # first step from a value with an infinite standard error, relative to its range, or to itself
+ALIKE = 0.999  # correlation above which parameters count as one: a profile along their valley is slow and useless
 EXACT = 1e-3  # RMS residual below which 32-bit rounding hides the rise of a sum over many values
-LARGE = 4e6  # derivatives of a problem above which only parameters without a finite standard error get a profile
+LARGE = 4e6  # number of derivatives above which only parameters with an infinite standard error have a profile
 SPAN = 100.0  # range of a parameter whose bounds are far apart, in units of the larger of 1 and its value
 
 
@@ -44,18 +45,18 @@ class Costs(Residuals, Protocol):
 def profiles(
     problem: Costs, numbers: Floats, cost: float, sure: Certainty, quantiles: Floats, scale: float, large: bool
 ) -> Floats:
-    """Ends of the 95 % intervals of parameters for which value +- t error does not hold, (K, 2); NaN for the others.
+    """Ends of the 95 % intervals of parameters for which value +- t error is not valid, (K, 2); NaN for the others.
 
     Parameters of which the data determine only a combination, or nearly so, have no profile (NaN). In a large problem,
-    only parameters with an infinite standard error have one: each profile solves the problem some fifty times.
+    only parameters with an infinite standard error have one, because each profile solves the problem about fifty times.
 
     numbers    solution, (K,)
     cost       its sum of squares
     sure       standard errors and the pseudoinverse of J^T J
     quantiles  quantiles of Student's distribution, (K,)
     large      whether the problem is large: more than `LARGE` derivatives, or tables to compute in each step
-    scale      mean squared residual, used as s if the data determine no parameter; otherwise, an undetermined parameter
-               gets the median s
+    scale      mean squared residual, used as s if the data determine no parameter; otherwise, the median s is used for
+               an undetermined parameter
     """
     low, high, ratio = ranges(problem.free)
     ends = np.full((len(numbers), 2), np.nan)
@@ -80,13 +81,14 @@ def profiles(
 
 
 def _span(value: float, low: float, high: float) -> float:
-    """Length of a parameter's range, if that is a sensible unit; else a multiple of its value."""
+    """Unit of length for a parameter: the length of its range, or a multiple of its value if the bounds are far
+    apart."""
     return float(min(high - low, SPAN * max(1.0, abs(value))))
 
 
 def _is_even(problem: Costs, numbers: Floats, k: int, half: float, inverse: Floats, cost: float) -> bool:
-    """Whether the sum of squares rises equally toward both ends of value +- half, which lie within the range; the other
-    parameters follow the valley of the parabola."""
+    """Whether the ends of value +- half lie within the range and the sum of squares rises equally toward both; the
+    other parameters are moved along the valley of the parabola."""
     low, high, _ = ranges(problem.free)
     direction = inverse[:, k] / inverse[k, k]
     ends = [numbers - half * direction, numbers + half * direction]
@@ -103,7 +105,7 @@ def _end(problem: Costs, numbers: Floats, k: int, bound: float, step: float, lev
     sign = np.sign(bound - numbers[k])
     rise = level - cost
     inside, start, outside = 0.0, numbers, np.inf
-    roots = [(0.0, 0.0)]  # distances, and sqrt of the rise divided by the wanted one: nearly linear, 1 at the end
+    roots = [(0.0, 0.0)]  # distances, and sqrt(rise / required rise), which is nearly linear and 1 at the end
     distance = min(step, abs(bound - numbers[k]))
     for _ in range(POINTS):
         at = start.copy()
@@ -122,7 +124,7 @@ def _end(problem: Costs, numbers: Floats, k: int, bound: float, step: float, lev
 
 
 def _next(roots: list[tuple[float, float]], inside: float, outside: float, most: float) -> float:
-    """The next distance, by the secant through the last two points, between the nearest points on the two sides."""
+    """The next distance, from the secant through the last two points, limited to the interval that contains the end."""
     (a, fa), (b, fb) = sorted(roots)[-2:] if not np.isfinite(outside) else _bracket(roots, inside, outside)
     guess = b + (1.0 - fb) * (b - a) / (fb - fa) if fb > fa else np.inf
     if not np.isfinite(outside):

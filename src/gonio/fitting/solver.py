@@ -2,7 +2,8 @@
 
 One kernel evaluates the residuals of all data and their derivatives, in forward mode; one derivative serves all three
 channels of a color if the channels do not mix in `eval`. BLAS sums the normal equations over rows. A pass over 1.46
-million cells and six parameters moves about 70 MB and is limited by that and by exp, log and sqrt.
+million cells and six parameters moves about 70 MB; its speed is limited by the memory bandwidth and by exp, log and
+sqrt.
 """
 
 from __future__ import annotations
@@ -22,20 +23,20 @@ from .data import Data
 from .parameters import CHANNELS, Free, inner_of, ranges, start_of, with_drjit
 
 Array = backend.Array
-BLOCK = 1 << 13  # rows that BLAS sums at a time; it splits more among its threads, whose number changes the last bits
+BLOCK = 1 << 13  # rows per BLAS call: larger blocks are split among threads, whose number changes the last bits
 SMALL = 1e-3  # fraction of the largest value: "log" and "relative" are absolute below it, relative above
-DARK = 1e3  # times the largest value of the other channels: divides differences in a channel that is 0 everywhere
+DARK = 1e3  # floor of a channel that is 0 everywhere, relative to the largest value of the other channels
 NEAR = 0.1  # relative difference below which a series is more accurate than the logarithm in float32
 
 
 # --------------------------------------------------------------------------- metrics
 
 METRICS = {
-    "relative": "difference over the value of the model, unbiased by noise in the data; logarithmic from a ratio of 2",
-    "log": "log(1 + f cos / c), c a thousandth of the brightest value in the data's median channel: nearly relative",
-    "log1p": "log(1 + f cos), as Low2012",
+    "relative": "difference divided by the model's value, unbiased by noise; logarithmic for ratios above 2",
+    "log": "log(1 + f cos / c), where c is a thousandth of the 99 % quantile of the data: nearly relative",
+    "log1p": "log(1 + f cos), as in Low2012",
     "cuberoot": "(f cos)^(1/3), close to perceived brightness",
-    "linear": "f cos itself, as Ngan2005",
+    "linear": "f cos, as in Ngan2005",
 }
 
 
@@ -54,25 +55,26 @@ def metric(name: str, value: Array, floor: Array) -> Array:
 
 
 def _size(value: Array) -> Array:
-    """|value| with a derivative of 1 at 0: that of `abs` is 0 there, so a color that reaches 0 would stay at 0."""
+    """|value| with a derivative of 1 at 0. The derivative of `abs` at 0 is 0, so a color that reaches 0 would stay at
+    0."""
     return backend.drjit().select(value < 0.0, -value, value)
 
 
 def deviance(model: Array, value: Array, floor: Array) -> Array:
     """Residual r of a model f against a value v, r^2 = 2 rho, for the metric "relative".
 
-    Iteratively reweighted least squares of (v - f) / (f + c) solve sum((v - f) / (f + c)^2 df) = 0. These are the
-    quasi-likelihood equations for a standard deviation proportional to f + c (Wedderburn1974), whatever the noise
-    distribution: the true model is a root if v is unbiased. But they minimize nothing, and 0 is also a root. The
-    function with that derivative is the deviance of the gamma distribution,
+    Iteratively reweighted least squares for (v - f) / (f + c) solve sum((v - f) / (f + c)^2 df) = 0. These are the
+    quasi-likelihood equations for a standard deviation proportional to f + c (Wedderburn1974), for any distribution of
+    the noise: the true model is a root if v is unbiased. However, they do not minimize a function, and 0 is also a
+    root. The function with this derivative is the deviance of the gamma distribution,
 
         rho = u - log(1 + u),  u = (v - f) / (f + c),
 
-    which is large for a model of 0. For u >= 1 (data twice the model, more than noise explains), rho is log(1 + u) plus
-    a constant: its derivative is bounded there, like Huber's (Huber1964), and it is bounded at u = -1 anyway. So no
-    value has more influence than 1 / (f + c). For values below -c / 2, the derivative uses v + c, clamped to 0, and the
-    constant is that for -c / 2, since no model is negative. For values below -c, c is -v: with an error of that size,
-    a model of 0 cannot be told from one below |v|.
+    which is large for a model of 0. For u >= 1 (data at least twice the model, a difference that noise does not
+    explain), rho is log(1 + u) plus a constant: its derivative is bounded there, as in Huber1964, and it is bounded at
+    u = -1 in any case. Therefore, no value has more influence than 1 / (f + c). For values below -c / 2, the derivative
+    uses v + c, clamped to 0, and the constant is that for -c / 2, because no model is negative. For values below -c, c
+    is -v: with an error of this size, a model of 0 cannot be distinguished from one below |v|.
     """
     dr = backend.drjit()
     size = _size(model)
@@ -97,7 +99,7 @@ Linearized = tuple[NDArray[np.floating], NDArray[np.floating], list[int]]
 
 
 class Residuals(Protocol):
-    """A least-squares problem: free parameters, and residuals with their derivatives, in parts."""
+    """A least-squares problem: its free parameters, and its residuals with their derivatives, divided into parts."""
 
     free: list[Free]
 
@@ -108,7 +110,7 @@ class Residuals(Protocol):
 
 @dataclass
 class Problem:
-    """Residuals of a material against data: metric(eval) - metric(value), channel by channel.
+    """Residuals of a material with respect to data: metric(eval) - metric(value) for each channel.
 
     material  the material to fit
     free      its free parameters
@@ -135,7 +137,7 @@ class Problem:
         self.columns = self._of_parameters()
 
     def _of_parameters(self) -> list[list[int]]:
-        """Groups of parameters that share one derivative: a single one, or the three channels of a color."""
+        """Groups of parameters that share one derivative: a single parameter, or the three channels of a color."""
         groups: list[list[int]] = []
         at = 0
         for one in self.free:
@@ -145,8 +147,8 @@ class Problem:
         return groups
 
     def _mix(self, channels: list[int]) -> bool:
-        """Whether the first of a color's channels changes the values of the others: at the material's own values, or
-        at values inside all ranges, since a tint of 0 hides that it mixes."""
+        """Whether the first channel of a color affects the other channels of `eval`, at the material's own values or at
+        values inside all ranges, because a tint of 0 would conceal such a mixture."""
         if len(channels) == 1:
             return False
         dr, types = backend.drjit(), backend.types("float32")
@@ -245,8 +247,8 @@ def floors_of(value: Floats) -> Floats:
     brightest values in the data. Negative values are ignored: in measured files, they are in highlights whose color is
     out of gamut.
 
-    In a channel without a positive value, that of a dead detector or of a black material, no difference is relative.
-    Its floor is so large that the channel determines its own parameters, but not those that it shares with others.
+    In a channel without positive values, as for a defective detector or a black material, no difference is relative.
+    Its floor is so large that the channel determines only its own parameters, not those shared with other channels.
     """
     brightest = np.percentile(np.maximum(value, 0.0), 99.0, axis=0)
     dark = value.max(axis=0) <= 0.0
@@ -254,8 +256,8 @@ def floors_of(value: Floats) -> Floats:
 
 
 def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
-    """Groups of parameters that share one derivative: a single one, or the three channels of a color if they do not
-    mix, which is tested at a few directions."""
+    """Groups of parameters that share one derivative: a single parameter, or the three channels of a color if they do
+    not mix, which is tested at a few directions."""
     w = np.random.default_rng(3).normal(size=(2, 64, CHANNELS))
     w[..., 2] = np.abs(w[..., 2]) + 0.1
     w /= np.linalg.norm(w, axis=-1, keepdims=True)
@@ -303,7 +305,7 @@ def solve(
     """Minimize the sum of squares from `start` within the ranges of the parameters, in at most `steps` steps.
 
     tolerance  relative decrease of the cost below which the solver stops
-    held       indices of parameters that keep their value
+    held       indices of parameters that stay fixed
     progress   called with the cost after each accepted step
     """
     low, high, ratio = ranges(problem.free)
@@ -355,7 +357,8 @@ def solve(
 
 
 def _moves(numbers: Floats, gradient: Floats, low: Floats, high: Floats, held: Sequence[int]) -> NDArray[np.bool_]:
-    """Which parameters a step may change: not those held, nor those at a bound with a gradient that points outside."""
+    """Mask of the parameters that a step may change: neither held, nor at a bound with a step that would leave the
+    range."""
     stuck = ((numbers <= low) & (gradient > 0.0)) | ((numbers >= high) & (gradient < 0.0))
     stuck[list(held)] = True
     return np.asarray(~stuck)

@@ -11,14 +11,14 @@ from ..measure.tables.base import Floats
 from .parameters import Free, ranges, start_of
 
 WIDTHS = (0.03, 0.1, 0.3, 0.7)  # lobe widths of the starting points
-INDICES = (0.5, 2.0)  # for unbounded colors such as indices, whose default may have zero slope
+INDICES = (0.5, 2.0)  # starting values of unbounded colors such as indices, at whose default the derivative may be 0
 STARTS = 24  # maximum number of systematic starting points
 RANDOM = 6  # additional random starting points
 OPEN = 4.0  # upper limit for random values of unbounded parameters
 
 
 def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
-    """The starting points: the values of the material, and combinations of other lobe widths and indices."""
+    """The starting points: the material's own values, and combinations of other lobe widths and indices."""
     first = start_of(material, free)
     starts = [first]
     open_ended = np.repeat([one.kind == "spectrum" and one.high > 1e5 for one in free], [one.count for one in free])
@@ -36,7 +36,7 @@ def starts_of(material: BSDF, free: list[Free]) -> list[Floats]:
 
 
 def random_starts(first: Floats, free: list[Free], count: int = RANDOM, seed: int = 23) -> list[Floats]:
-    """Random starting points within the ranges of the parameters; unbounded ranges are cut at `OPEN`.
+    """Random starting points within the ranges of the parameters; unbounded ranges end at `OPEN`.
 
     first  values of the free parameters in the material, (K,)
     seed   seed of the random numbers
@@ -46,14 +46,14 @@ def random_starts(first: Floats, free: list[Free], count: int = RANDOM, seed: in
 
 
 def between(free: list[Free], share: float) -> Floats:
-    """Numbers at a fraction of their ranges, (K,), on a logarithmic scale for lobe widths; unbounded ranges are cut at
+    """Numbers at a fraction of their ranges, (K,), on a logarithmic scale for lobe widths; unbounded ranges end at
     `OPEN`."""
     count = sum(one.count for one in free)
     return _inside(free, np.zeros(count), np.full(count, share))
 
 
 def _inside(free: list[Free], first: Floats, share: Floats) -> Floats:
-    """Numbers at a fraction of their ranges, (K,); unbounded ranges are cut at `OPEN`, or at twice `first`."""
+    """Numbers at a fraction of their ranges, (K,); unbounded ranges end at `OPEN` or at twice `first`."""
     low, high, ratio = ranges(free)
     high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
     low = np.where(low < -1e5, -high, low)
@@ -66,10 +66,10 @@ def _is_width(one: Free) -> bool:
 
 
 def _of_width(one: Free, width: float) -> float:
-    """The value of a parameter that gives a lobe of this width."""
+    """The value of a parameter for which the lobe has the given width."""
     if one.kind == "alpha":
         return width
-    return float(np.sqrt(width)) if _rough(one) else 2.0 / (width * width)  # the power of a cosine lobe of that width
+    return float(np.sqrt(width)) if _rough(one) else 2.0 / (width * width)  # exponent of a cosine lobe of this width
 
 
 def _rough(one: Free) -> bool:

@@ -1,1 +1,1 @@
-"""Measure materials: with a virtual goniometer, from photographs of a sphere, and by fits to pictures."""
+"""Measure materials with a virtual goniometer, from photographs of a sphere, or by fitting a scene to a picture."""

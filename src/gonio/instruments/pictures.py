@@ -1,7 +1,7 @@
-"""Fit parameters of a scene's materials to a picture of the scene, with Gonio's path tracer and its derivatives.
+"""Fit the parameters of materials in a scene to a picture, by differentiable rendering with Gonio's path tracer.
 
 Each step renders the picture and its derivatives with respect to all parameters (`transport.gradients`) and solves for
-all of them at once, as the fit to tables does. A fit takes about ten steps and provides standard errors.
+all parameters at once, as in a fit to a table. A fit takes about ten steps and provides standard errors.
 """
 
 from __future__ import annotations
@@ -39,28 +39,28 @@ from ..transport.integrators import Render, Settings
 
 Floats = NDArray[np.float64]
 SPP, STEPS = 64, 20
-DARK = 0.05  # fraction of the median brightness: residuals are absolute below, relative above
+DARK = 0.05  # fraction of the median brightness: residuals are absolute below and relative above
 TILE = 8  # pixels: errors within a tile are correlated
-SHOWN = 16  # samples of the final picture divided by those of a step, so that its noise hides no difference
+SHOWN = 16  # ratio of the sample counts of the final picture and of a step, so that noise does not hide differences
 OTHER = 0x9E3779B9  # XOR mask between the seeds of picture and derivatives
 DEEPEST = 8  # path segments if the scene sets no depth
 
 
 @dataclass(frozen=True)
 class PictureFit:
-    """Result of a fit to a picture.
+    """The result of a fit to a picture.
 
-    materials    materials with the fitted values, by their paths: "shapes.0.material"
-    names        names of the fitted numbers: "shapes.0.material.alpha", ...
+    materials    materials with the fitted values, by their paths, such as "shapes.0.material"
+    names        names of the fitted numbers, such as "shapes.0.material.alpha"
     values       fitted numbers, (K,)
     errors       standard errors, (K,); inf for numbers that the picture does not determine
-    correlation  (K, K)
-    losses       mean squared relative difference before the first step and after each step
-    relative     mean |difference| divided by mean brightness
+    correlation  correlation matrix of the fitted numbers, (K, K)
+    losses       mean squared relative difference, before the first step and after each step
+    relative     mean absolute difference divided by the mean brightness
     wanted       the given picture, (H, W, 3)
     fitted       the picture rendered with the fitted values, (H, W, 3)
     notes        remarks on the quality of the fit
-    seconds      duration of the fit
+    seconds      duration of the fit, s
     """
 
     materials: Mapping[str, BSDF]
@@ -77,11 +77,11 @@ class PictureFit:
 
     @property
     def interval(self) -> Floats:
-        """95 % intervals, (K, 2)."""
+        """95 % confidence intervals of the fitted numbers, (K, 2)."""
         return np.stack([self.values - NORMAL_95 * self.errors, self.values + NORMAL_95 * self.errors], axis=1)
 
     def as_dict(self) -> dict[str, Any]:
-        """Dictionary for JSON; unknown errors are null."""
+        """The result as a dictionary for JSON, in which unknown errors are null."""
         return {
             "materials": {path: notation.written(one) for path, one in self.materials.items()},
             "notations": {path: notation.for_files(one) for path, one in self.materials.items()},
@@ -109,7 +109,7 @@ class PictureFit:
 
 @dataclass(frozen=True)
 class Fitting:
-    """Options of the renders during a fit; the fields are arguments of `fit_picture`."""
+    """Options of the renders during a fit. The fields are also arguments of `fit_picture`."""
 
     spp: int = SPP
     seed: int | None = None
@@ -119,7 +119,7 @@ class Fitting:
 
 
 class FittingKeywords(TypedDict, total=False):
-    """The types of `Fitting` as keywords."""
+    """The fields of `Fitting` as keyword arguments, for type checkers."""
 
     spp: int
     seed: int | None
@@ -142,20 +142,21 @@ def fit_picture(
     progress: Callable[[int, float], None] = lambda step, loss: None,
     **rendering: Unpack[FittingKeywords],
 ) -> PictureFit:
-    """Fit parameters of a scene's materials to a picture of the scene.
+    """Fit the parameters of materials in a scene to a picture of the scene.
 
         result = fit_picture("photo.exr", "scene.json", ["shapes.0.material"])
 
-    picture     .exr, .hdr, .npz or .png, linear radiance from the camera of the scene
+    picture     a picture of linear radiance, taken by the camera of the scene: .exr, .hdr, .npz or .png
     scene       a scene file; the fit starts from the parameters of its materials
-    free        "shapes.0.material" for all free parameters of that material, "shapes.0.material.alpha" for one
-    model       a material that replaces the first of `free`
-    param       values by their path in the scene, as in `gonio study`, set before the fit
+    free        parameters to fit: "shapes.0.material" for all free parameters of this material,
+                "shapes.0.material.alpha" for one parameter
+    model       a material that replaces the first material of `free`
+    param       values that are set before the fit, by their paths in the scene, as in `gonio study`
     spp         samples per pixel of each render
     steps       maximum number of steps
-    seed        seed of all random numbers, 1 if None
+    seed        seed of all random numbers; 1 if None
     progress    called after each step with its number and the loss
-    Raises InputError for invalid files and paths, and if picture and scene do not match.
+    Raises InputError for invalid files and paths, and if the picture does not match the scene.
     """
     started = time.perf_counter()
     wanted = images.read(picture).pixels
@@ -258,12 +259,12 @@ class Problem:
         self.mi, self.scene, self.targets, self.spp, self.seed = mi, built.scene, targets, spp, seed
         self.depth = depth
         self.wanted = wanted.astype(np.float64)
-        # mean over neighbors, so that the weight of a pixel does not depend on its own noise
+        # the mean over neighbors makes the weight of a pixel almost independent of its own noise
         level = ndimage.uniform_filter(np.abs(self.wanted), (3, 3, 1))
         lit = level[level > 0.0]
         self.weight = 1.0 / (level + DARK * float(np.median(lit)))
         self.free = [replace(one, path=f"{target.path}.{one.path}") for target in targets for one in target.moving]
-        # groups of parameters that share one derivative
+        # groups of parameters with a common derivative
         self.columns: list[list[int]] = []
         self.along: list[Along] = []
         for target in targets:
@@ -282,7 +283,7 @@ class Problem:
         return np.concatenate([start_of(target.material, target.moving) for target in self.targets])
 
     def put(self, numbers: Floats) -> None:
-        """Set the parameters of the plugins."""
+        """Set the parameters of the plugins to the given numbers."""
         import drjit as dr
 
         at = 0
@@ -300,7 +301,7 @@ class Problem:
         return Settings("path", max_depth=self.depth, seed=seed)
 
     def render(self, numbers: Floats, spp: int | None = None, seed: int | None = None) -> Floats:
-        """Render the picture with these parameters; None selects the fit's own samples per pixel or seed."""
+        """Render the picture with the given parameters. For None, `spp` and `seed` are those of the fit."""
         self.put(numbers)
         render = Render(self.scene, self._settings(self.seed if seed is None else seed))
         render.advance(spp or self.spp)
@@ -310,9 +311,9 @@ class Problem:
         return float(np.mean(((self.render(numbers) - self.wanted) * self.weight) ** 2))
 
     def linearized(self, numbers: Floats) -> list[Linearized]:
-        """Residuals and derivatives per channel."""
+        """The residuals of each channel and their derivatives."""
         residual = (self.render(numbers) - self.wanted) * self.weight
-        # independent samples: noise shared by derivatives and residuals would bias the gradient
+        # independent samples, because noise common to the derivatives and the residuals would bias the gradient
         render = Gradients(self.scene, self._settings(self.seed ^ OTHER), self.along)
         render.advance(self.spp)
         slopes = [slope.astype(np.float64) * self.weight for slope in render.slopes()]

@@ -1,4 +1,4 @@
-"""The angles at which a material's values are known: all, unless it is a measured table that covers fewer."""
+"""The angles at which the values of a material are known: all angles, except for measured tables that cover fewer."""
 
 from __future__ import annotations
 

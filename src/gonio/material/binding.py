@@ -78,7 +78,7 @@ def evaluate_derived(material: Material, rays: int = 1) -> object:
     if dr.flag(dr.JitFlag.SymbolicScope) or any(dr.width(v) > rays or dr.grad_enabled(v) for v in given):
         return None
     derived = material.derive()
-    dr.make_opaque(*_arrays(derived))  # one by one: Dr.Jit evaluates nothing in a tuple that contains names
+    dr.make_opaque(*_arrays(derived))  # one by one, because Dr.Jit evaluates nothing in a tuple that contains names
     return derived
 
 
@@ -106,5 +106,5 @@ def shift(material: M, path: str, change: Callable[[Value], Value]) -> M:
 
 
 def _plain(material: Material) -> bool:
-    """Whether all numbers are plain numbers, since arrays could be modified by their owner."""
+    """Whether all numbers are plain numbers. Arrays could be modified by their owner."""
     return all(isinstance(leaf.value, int | float | tuple) for leaf in tree.leaves(material) if leaf.parameter.numeric)

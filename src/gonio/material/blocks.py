@@ -1,10 +1,10 @@
 """Transfer of large arrays between NumPy and Dr.Jit, in the kernel that computes the results.
 
 The rows of an array are interleaved, x y z x y z. NumPy takes ten times as long to separate and convert their
-components, and to check that they are unit vectors, as the kernel takes to evaluate a metal; here the kernel does all
-this, on all threads. This kernel must be compiled separately from the one for small arrays, so it pays off for large
-arrays only. Results consist of separate components, since a kernel would take three times as long to write interleaved
-rows.
+components, and to check that they are unit vectors, as the kernel takes to evaluate a metal; here, the kernel does all
+of this, on all threads. This kernel must be compiled separately from the one for small arrays, so it is worthwhile only
+for large arrays. Results consist of separate components, because a kernel would take three times as long to write
+interleaved rows.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from ..ops import backend
 
-MANY = 1 << 20  # rows
+MANY = 1 << 20  # smallest number of rows for which this module is used
 UNIT = 1e-2  # tolerance of a direction's length, for rounding errors and values typed by hand
 
 

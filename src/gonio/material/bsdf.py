@@ -1,4 +1,4 @@
-"""The base of all materials: frozen declared parameters, pure formulas of them, and facts about the material.
+"""The base class of all materials: frozen, declared parameters, pure functions of them, and facts about the material.
 
     class Lambert(BSDF):
         albedo: Colour = spectrum(0.5, "fraction of light that is reflected", high=1.0)
@@ -7,9 +7,9 @@
         def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
             return self.albedo * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
-Only `eval` must be defined. `pdf` and `sample` default to a guide, a density tabulated from it
-(`gonio.material.guide`), `f` is computed from it, and every fact has a safe default. Other packages query these members
-and never test for a class.
+Only `eval` must be defined. By default, `pdf` and `sample` use a guide, a density tabulated from `eval`
+(`gonio.material.guide`); `f` is computed from `eval`, and every fact has a safe default. Other packages query these
+members and never test for a class.
 
 The formulas are written in the vocabulary of `gonio.ops` and use *bound* parameters (`gonio.material.binding`): Dr.Jit
 values, or symbols while recording. Callers pass NumPy arrays, lists or Dr.Jit vectors (`gonio.material.calling`).
@@ -69,8 +69,8 @@ class BSDF(Material):
     """Base of every material. Subclasses are frozen dataclasses; `name` is derived from the class name by default.
 
     known_violations    law -> KnownViolation, for laws that the model violates by design (Phong: reciprocity, energy)
-    limits              values at which a part of the model is switched off, and what the model then equals
-    spelling            path of the file that defines the class, used as its name in strings; "" if written in Python
+    limits              values at which a part of the model is switched off, and the model that it then equals
+    spelling            path of the file that defines the class, its name in strings; "" if it is written in Python
     only_rgb            whether `eval` returns red, green and blue regardless of the renderer's channels
     stochastic          whether `eval`, `pdf` and the weight are random estimates whose expectation is the exact value
     reads_wavelengths   whether its bound copy needs the rays' wavelengths, as the attribute `wavelengths`
@@ -105,7 +105,7 @@ class BSDF(Material):
             letters = ("-" + c.lower() if c.isupper() else c for c in cls.__name__)
             cls.name = "".join(letters).lstrip("-").replace("_", "-")
         elif cls.__name__.startswith("_") and "name" not in vars(cls):
-            cls.name = ""  # a shared base of models, which must not be registered under its base's name
+            cls.name = ""  # a shared base of models, which must not be registered under the name of its base
         move_former_names(cls)
         own = vars(cls)
         for formula in ("eval", "pdf", "sample", "terms"):
@@ -140,7 +140,7 @@ class BSDF(Material):
 
         wo, wi       (N, 3), unit vectors away from the surface: toward the viewer and toward the light
         mode         "radiance" (transmission includes the factor (eta_o/eta_i)^2) or "importance" (without it)
-        precision    for arrays and tensors: "float32" or "float64"; None is the precision of the tensors, or for arrays
+        precision    for arrays and tensors: "float32" or "float64"; by default that of the tensors, or for arrays
                      that of `go.set_precision`
         derivatives  for arrays: paths of parameters; the result stacks the values and one derivative per path
         wavelengths  for arrays: wavelengths in nm, (M,); the result is (N, M). Colors must be gray: three numbers are
@@ -232,7 +232,7 @@ class BSDF(Material):
 
     @property
     def perturbs_normal(self) -> bool:
-        """Whether its normal, or that of an inner material, may differ from the surface's."""
+        """Whether the shading normal, here or in an inner material, may differ from the surface normal."""
         return any(inner.perturbs_normal for inner in tree.children(self).values())
 
     @property
@@ -253,7 +253,7 @@ class BSDF(Material):
 
     @property
     def microsurface(self) -> Microsurface | None:
-        """The rough surface that scatters the light, for which energy tables exist; None if there is none."""
+        """The rough surface that scatters the light, if energy tables exist for it; else None."""
         return None
 
     @property

@@ -1,4 +1,4 @@
-"""Calls of a material's methods by users: NumPy arrays, lists or Dr.Jit vectors in, the same kind out.
+"""Calls of a material's methods by users, with NumPy arrays, lists or Dr.Jit vectors as arguments and results.
 
 `method` wraps the formulas of a material. If the parameters are bound (in calls by another formula, a renderer or a
 recording), the formula runs unchanged; otherwise the material is bound, and the arguments and the result are converted.
@@ -234,7 +234,7 @@ def _on_numpy(
             if not ok:
                 _check_values(array, label, f"{name}: {label}")
     else:
-        backend.drjit().eval(parts)  # in one kernel, since the parts have computations in common
+        backend.drjit().eval(parts)  # in one kernel, because the parts share computations
         arrays = [backend.to_numpy(value, max(count, 1))[: count or None] for value in parts]
         arrays = [array[:0] for array in arrays] if count == 0 else arrays
     if len(shape) != 1 and not many:

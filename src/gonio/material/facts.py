@@ -25,7 +25,7 @@ class KnownViolation(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """Values at which a part of a model is switched off, and the consequences, which are tested by the law `limits`.
+    """Values at which a part of a model is switched off, and the consequences, which the law `limits` tests.
 
         limits = (
             Limit({"coat_weight": 0.0}, mutes=("coat_*",)),
@@ -61,7 +61,7 @@ class Microsurface(NamedTuple):
     ndf, masking, fresnel  names of the distribution of normals, the masking term and the Fresnel term
     alpha, rotation        the two widths and the rotation, as in the material's parameters
     eta                    index inside divided by index outside, for a dielectric; None for a conductor
-    albedo                 factor on all scattered light
+    albedo                 scale factor of all scattered light
     transmits              whether light is refracted into the material
     """
 

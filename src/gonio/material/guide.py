@@ -2,17 +2,17 @@
 
 A guide is tabulated over a *chart*, which maps directions to a distance from an axis and an azimuth about it. A glossy
 lobe is charted by half vectors about the surface normal, so that it does not move with the viewer (as in Dupuy2018); a
-broad or asymmetric lobe is charted by wi, about the normal or about the lobe's center. With v the half vector or wi,
-and q = |v - axis|^2 = 2 (1 - cos), the coordinates are phi and
+broad or asymmetric lobe is charted by wi, about the normal or about the lobe's center. Let v be the half vector or wi,
+and q = |v - axis|^2 = 2 (1 - cos). The coordinates are phi and
 
     s = log(1 + q / q0) / log(1 + q_max / q0),    dw = dq dphi / 2,    dq = (q + q0) log(1 + q_max / q0) ds,
 
-so that equal steps of s resolve a lobe of width sqrt(q0) and anything wider. A density over (s, phi), called a slice,
+so that equal steps of s resolve a lobe of width sqrt(q0) and any wider lobe. A density over (s, phi), called a slice,
 is stored for each of a few angles of wo (and, if `eval` depends on them, for azimuths of wo and values of parameters
 that vary over the surface). A slice is bilinear between its nodes; between two angles, the density is a mixture of two
 slices. A fraction of the samples follows the cosine, to cover light that the nodes miss.
 
-`pdf` is the density of `sample`, whatever the tables contain: a guide that fits badly causes noise but no bias.
+`pdf` is the density of `sample` regardless of the contents of the tables: a poor fit causes noise but no bias.
 `guide_search` computes the tables.
 """
 
@@ -241,7 +241,8 @@ class Guide(NamedTuple):
             if not lobe.full:
                 phi = where(u.z < 0.5, -phi, phi)
             w = lobe.direction(place, _in_azimuth(above, turn), s, phi)
-            # a direction below the surface, which the other side's lobe may contain too, becomes a failed sample: z = 0
+            # a direction below the surface, which the lobe of the other side may contain, becomes a failed sample:
+            # z = 0
             flattened = ops.rsqrt(maximum(w.x * w.x + w.y * w.y, 1e-20))
             w = where(w.z > 0.0, w, vec3(w.x * flattened, w.y * flattened, ops.zeros_like(w.z)))
             w = _in_azimuth(w, vec3(turn.x, -turn.y, turn.z))

@@ -14,20 +14,20 @@ from ..ops import Table
 from .guide import Lobe
 from .guide_probe import Grid, direction, mean_light
 
-ANGLES = 33  # of wo, from the normal to the horizon: steps of 2.8 degrees
-FEWER = 17  # if there are slices along more than the angle
-ROWS, COLUMNS = 64, 17  # nodes of s, and of the azimuth over 180 degrees
-ROUND = 33  # nodes of the azimuth over 360 degrees, if `eval` is not invariant under rotation
-REFINEMENTS = 4  # of the tables toward smaller variance; further ones have no effect
+ANGLES = 33  # number of angles of wo, from the normal to the horizon, in steps of 2.8 degrees
+FEWER = 17  # number of angles if there are slices along other axes as well
+ROWS, COLUMNS = 64, 17  # numbers of nodes of s, and of the azimuth over 180 degrees
+ROUND = 33  # number of nodes of the azimuth over 360 degrees, if `eval` is not invariant under rotation
+REFINEMENTS = 4  # number of refinements of the tables toward smaller variance; further ones have no effect
 JUDGED = 4  # one of this many azimuths of wo is tested
-FINE = 2  # evaluations of `eval` per step between nodes, along each axis
+FINE = 2  # number of evaluations of `eval` per step between nodes, along each axis
 HORIZON = np.radians(89.7)  # replaces 90 degrees, where the value is 0
 COSINES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # candidate fractions of samples that follow the cosine
-NARROWEST = 1e-10  # q of lobes 1e-5 wide
+NARROWEST = 1e-10  # smallest q, that of lobes 1e-5 wide
 WIDTH_ANGLES = (0.12, 0.45, 0.75)  # angles of wo at which a lobe's width is measured, as fractions of 90 degrees
 PEAKS, ZOOMS = 801, 3  # directions in the plane of wo that are searched for a lobe's peak, and successive zooms
 WIDTH_SHARE = 0.2  # fraction of a lobe's light within q0
-MIN_MEAN = 0.25  # lower limit of the refinement, relative to the mean about a node: `eval` may peak between the points
+MIN_MEAN = 0.25  # lower limit of the refinement, relative to the mean about a node; `eval` may peak between the points
 MIN_LIGHT = 1e-20  # light of a slice below which it counts as dark
 CHARTS = ("half", "normal", "center")
 
@@ -147,7 +147,7 @@ class Slices:
         self.s, self._rows, self._from_rows = _steps(ROWS, False)
         phi, self._columns, self._from_columns = _steps(ROUND if self.full else COLUMNS, self.full)
         self.span = 2.0 * np.pi if self.full else np.pi
-        # alternating halves, so that asymmetry is at least averaged
+        # alternating halves, so that an asymmetry is at least averaged
         flip = 1.0 if self.full else np.where(np.arange(len(phi)) % 2 == 0, 1.0, -1.0)
         self.phi = phi * self.span * flip
         self.cell = self.span / (len(self.s) * len(phi))
@@ -226,7 +226,7 @@ class Slices:
         density /= np.maximum(totals, MIN_LIGHT)[..., None, None]
         dark = totals <= MIN_LIGHT
         if dark.any() and not dark.all():
-            # wo near a black slice are sampled from it in part: it needs a density that integrates to 1 as well
+            # for wo near a black slice, some samples are drawn from it, so its density must also integrate to 1
             density[dark] = density[~dark].mean(0)
         along = density.reshape(len(self.sides), self.azimuths, len(self.versions), *density.shape[1:])
         mixed = 0.5 * (along[..., 1:, :, :] + along[..., :-1, :, :])
@@ -303,5 +303,5 @@ def _trapezoid(count: int, length: float) -> Grid:
 
 
 def named(stem: str, values: Grid) -> Table:
-    """A table with a unique name, since one shader may contain two guides."""
+    """A table with a unique name, because one shader may contain two guides."""
     return Table(f"guide_{stem}_{hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()[:8]}", values)

@@ -2,7 +2,7 @@
 
 Each suitable chart is tried: the resulting density is compared with `eval` at angles of wo midway between its slices,
 where it fits worst. The chart of smallest variance is chosen, together with the fraction of cosine-distributed samples
-that minimizes its variance. The search takes some tenths of a second; the guide is cached with the material.
+that minimizes its variance. The search takes a few tenths of a second; the guide is cached with the material.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from .guide_probe import Guided, alike, depends_on_azimuth, probe
 from .guide_versions import varying_parameters, version
 from .parameters import Material
 
-AZIMUTHS = 16  # of wo, if `eval` is not invariant under rotation
-VARYING = 9  # slices along a parameter that varies over the surface
-VARYING_TWO = 5  # along each of two
-CACHED = 16  # guides in memory, per class
+AZIMUTHS = 16  # number of azimuths of wo, if `eval` is not invariant under rotation
+VARYING = 9  # number of slices along a parameter that varies over the surface
+VARYING_TWO = 5  # number of slices along each of two such parameters
+CACHED = 16  # maximum number of guides in memory, per class
 
 
 def guide_of(material: Material) -> Guide:
@@ -46,8 +46,8 @@ def guide_of(material: Material) -> Guide:
 
 
 def lend(material: Material, other: Material) -> None:
-    """Make another material sample by this one's guide. The samples are correct for any values, though noisier than
-    with the other material's own guide."""
+    """Make another material use this material's guide for sampling. The samples are correct for any values, but noisier
+    than with the other material's own guide."""
     if material.guided:
         vars(other)["_guide"] = guide_of(material)
 

@@ -18,7 +18,7 @@ from ..ops import backend, graph, sincos
 from ..optics import indices
 from . import user_code
 
-CHANNELS = 3  # of a color given as plain numbers; a renderer's spectra have their own number
+CHANNELS = 3  # number of channels of a color given as plain numbers; a renderer's spectra have their own number
 
 # The value of a parameter: as given by the user; in a bound copy a Dr.Jit value or a symbol, which have no common type.
 Value: TypeAlias = Any
@@ -32,7 +32,7 @@ class Material:
     guided: ClassVar[bool] = False  # whether only `eval` is defined, so that a guide is computed for sampling
 
     _bound: ClassVar[bool] = False
-    _count: int = 1  # of materials in the tree; not a field
+    _count: int = 1  # number of materials in the tree; not a field
     _plain: Self | None = None
     _derived: object = None
 
@@ -55,7 +55,7 @@ class Material:
 
     @property
     def plain(self) -> Self:
-        """The unbound material: itself, or the one from which this copy was bound. It provides the facts that shape
+        """The unbound material: itself, or the one from which this copy was bound. Its facts determine the compiled
         code."""
         return self if self._plain is None else self._plain
 
@@ -120,11 +120,11 @@ class Parameter:
         return value
 
     def bind(self, value: object, types: backend.Types) -> Value:
-        """The value as Dr.Jit values of these types; values that shape the code are unchanged."""
+        """The value as Dr.Jit values of these types; static values are unchanged."""
         return value
 
     def symbol(self, value: object) -> Value:
-        """The symbol for the value in a recording; values that shape the code are unchanged."""
+        """The symbol for the value in a recording; static values are unchanged."""
         return value
 
     def is_off(self, value: object) -> bool:
@@ -143,7 +143,7 @@ class _Numeric(Parameter):
     """Base of the numeric kinds."""
 
     numeric = True
-    dimensions: ClassVar[int] = 0  # of one ray's value
+    dimensions: ClassVar[int] = 0  # number of dimensions of one ray's value
     symbol_type: ClassVar[str] = "float"
 
     @property
@@ -275,7 +275,7 @@ class AngleParameter(_Numeric):
 
 @dataclass(frozen=True)
 class ChoiceParameter(Parameter):
-    """A choice between names. It shapes the code, so it is static."""
+    """A choice between names. It is static: code is compiled for each choice."""
 
     kind = "choice"
     members: Choices = dataclasses.field(default_factory=dict)
@@ -299,7 +299,8 @@ class ChoiceParameter(Parameter):
         return self.members if isinstance(self.members, Family) else None
 
     def spelled(self, name: str) -> str:
-        """The name by which another process finds a member: FILE.py:NAME for one that only this program registered."""
+        """The name by which another process finds a member: FILE.py:NAME for a member that only this program has
+        registered."""
         return name if self.family is None else self.family.spelled(name)
 
     def portable(self, value: object) -> object:
@@ -316,7 +317,7 @@ class ChoiceParameter(Parameter):
 
 @dataclass(frozen=True)
 class IntegerParameter(ChoiceParameter):
-    """A whole number that shapes the code, stored as a string: a choice that accepts every whole number in its range.
+    """A static whole number, stored as a string: a choice that accepts every whole number in its range.
 
     `choices` lists the numbers to be tested, which are the first ones of a large range.
     """
@@ -347,11 +348,11 @@ class IntegerParameter(ChoiceParameter):
             raise InputError(f"{str(value)[:40]} given, {self.range} expected", location)
 
 
-_LEAST, _MOST = 4, 16  # numbers that are tried: fewest, for a range without an end, and most
+_LEAST, _MOST = 4, 16  # how many numbers are tested: at least, for a range without an end, and at most
 
 
 class FlagParameter(Parameter):
-    """A switch that shapes the code."""
+    """A static switch: code is compiled for each of its two values."""
 
     kind = "flag"
 

@@ -1,4 +1,4 @@
-"""Declarations of a material's parameters, each with kind, range, unit and a line of documentation.
+"""Declarations of a material's parameters, each with its kind, range, unit and one line of documentation.
 
     `albedo: Colour = spectrum(0.5, "fraction of light that is reflected", high=1.0)`
 
@@ -155,7 +155,7 @@ def angle(default: PlainNumber = 0.0, doc: str = "") -> Angle:
 
 
 def choice(default: PlainMember, doc: str, choices: Choices, *, white: str | None = None) -> str:
-    """Declare a choice between names. It shapes the code, so it is static.
+    """Declare a choice between names. It is static: code is compiled for each choice.
 
     default  a name; for a family also a class, an instance, or FILE.py:CLASS relative to the file of the declaration
     choices  name -> description, or a function that returns such a mapping; or a family, such as `go.NDF.family`, whose
@@ -172,12 +172,13 @@ def choice(default: PlainMember, doc: str, choices: Choices, *, white: str | Non
 
 
 def flag(default: bool, doc: str) -> bool:
-    """Declare a switch, True or False, that shapes the code."""
+    """Declare a static switch, True or False: code is compiled for each of the two values."""
     return _declare(FlagParameter, default, doc)
 
 
 def file(default: str | None = None, doc: str = "") -> Value:
-    """Declare the path of a data file. The file shapes the code, so it is read when the material is constructed."""
+    """Declare the path of a data file. The file is read when the material is constructed, because the code depends on
+    it."""
     return _declare(FileParameter, default, doc)
 
 

@@ -17,7 +17,7 @@ M = TypeVar("M", bound=Material)
 def symbols(material: M, without: Iterable[str] = ()) -> M:
     """A copy bound to symbols, one per numeric parameter; an angle given as the plain number 0 has none.
 
-    without  paths of parameters that remain plain numbers, since they switch a component off (`switched_off`), so that
+    without  paths of parameters that remain plain numbers because they switch a component off (`switched_off`), so that
              the code of the component is omitted
     """
     bound = binding.bind(material, lambda parameter, value: parameter.symbol(value))

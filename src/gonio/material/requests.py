@@ -67,7 +67,7 @@ def at_wavelengths(
 
     wavelengths  wavelengths in vacuum, nm, (M,)
     formula      function of a bound material that returns a Dr.Jit value
-    Raises InputError for colors whose channels differ, since three numbers are not a spectrum.
+    Raises InputError for colors whose channels differ, because three numbers are not a spectrum.
     """
     nm = np.atleast_1d(np.asarray(wavelengths, float))
     if nm.ndim != 1 or not nm.size or not np.all(np.isfinite(nm) & (nm > 0.0)):

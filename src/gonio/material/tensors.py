@@ -23,8 +23,8 @@ from . import binding, tree
 from .parameters import Material
 from .sample import Sample
 
-Tensor: TypeAlias = Any  # of a library that need not be installed
-LIBRARIES = {"torch": "torch", "jax": "jax", "jaxlib": "jax"}  # by the first part of a type's module
+Tensor: TypeAlias = Any  # a tensor of a library that need not be installed
+LIBRARIES = {"torch": "torch", "jax": "jax", "jaxlib": "jax"}  # libraries by the first part of a type's module
 
 
 def library(*values: object) -> str:

@@ -3,7 +3,7 @@
     for path, parameter, value, owner in leaves(material): ...      "alpha", "base.alpha", "base.a.albedo"
     rougher = replace(material, {"base.alpha": 0.4})
 
-Works on bound and unbound materials.
+All functions work on bound and unbound materials.
 """
 
 from __future__ import annotations

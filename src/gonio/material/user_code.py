@@ -22,7 +22,7 @@ from .. import members
 from ..errors import GonioError, InputError, did_you_mean
 
 _CODE = re.compile(r"(?P<file>.+\.py):(?P<name>\w[\w-]*)")
-PREFIX = "gonio_file_"  # of such modules' names in sys.modules
+PREFIX = "gonio_file_"  # prefix of the names of such modules in sys.modules
 
 Stamp = tuple[int, int]
 _loaded: dict[Path, tuple[Stamp, ModuleType]] = {}
@@ -81,7 +81,7 @@ def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> object
         raise InputError(f"'{text}' names no class in a file", where, "give FILE.py:CLASS, such as ward.py:Ward")
     try:
         path = ((folder or Path()) / Path(os.path.expanduser(match["file"]))).resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, no such user, a zero byte
+    except (OSError, RuntimeError, ValueError) as error:  # circular links, an unknown user, a zero byte
         raise InputError(f"'{match['file']}' is not a file path: {error}", where, "give FILE.py:CLASS") from None
     module, name = module_of(path, where), match["name"]
     named = vars(module).get(name)
@@ -122,7 +122,7 @@ def files_in(text: str) -> list[Path]:
 
 
 def with_imports(path: Path) -> list[Path]:
-    """A Python file and the local files that it imports, recursively, since its behavior depends on all of them."""
+    """A Python file and the local files that it imports, recursively, because its behavior depends on all of them."""
     files: dict[Path, None] = {}
     waiting = [path]
     while waiting:
@@ -148,8 +148,8 @@ def with_imports(path: Path) -> list[Path]:
 
 
 def forget() -> None:
-    """Discard all loaded files: each is run again on its next use, even if unchanged, since its imports may have
-    changed."""
+    """Discard all loaded files: each is run again on its next use, even if it is unchanged, because its imports may
+    have changed."""
     _loaded.clear()
 
 

@@ -1,7 +1,7 @@
 """Measured materials: files (`formats`), tables (`tables`) and smaller tables (`compression`).
 
-table = read("gold.binary")                  a table of one kind, with its metadata
-compare.convert("gold.binary", "gold.bsdf").error    converted to another format, with the error
+table = read("gold.binary")                          # a table with its metadata
+compare.convert("gold.binary", "gold.bsdf").error    # the error of a conversion to another format
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from .formats.base import Format, by_suffix, contents
 from .tables.base import Measurement
 
 _read: dict[tuple[str, str], tuple[tuple[int, int], Measurement]] = {}
-SAMPLE = "sample"  # names the small table shipped with Gonio, made by docs/make_sample_table.py
-CACHED = 8  # tables kept in memory, the most recently used
+SAMPLE = "sample"  # name of the small table that is shipped with Gonio, made by docs/make_sample_table.py
+CACHED = 8  # number of most recently used tables that stay in memory
 
 
 def suffixes() -> list[str]:
@@ -25,15 +25,15 @@ def suffixes() -> list[str]:
 
 
 def parted(file: str) -> tuple[str, str]:
-    """File and item from "FILE" or "FILE:ITEM", for files that hold several materials."""
+    """Split "FILE:ITEM", which names one material of several in a file, into file and item; the item may be missing."""
     path, colon, item = file.rpartition(":")
     return (path, item) if colon and by_suffix(path) and not by_suffix(file) else (file, "")
 
 
 def names_table(text: str) -> bool:
-    """Whether a string names a file of measurements, by the suffix: "gold.binary", "merl.npz:chrome".
+    """Whether a string names a measurement file, judging by its suffix: "gold.binary", "merl.npz:chrome".
 
-    For a format with several materials per file, an item is required: a plain .npz may contain anything.
+    If the format has several materials per file, the item is required, because a plain .npz may contain any data.
     """
     path, item = parted(text)
     formats = by_suffix(path)
@@ -41,10 +41,10 @@ def names_table(text: str) -> bool:
 
 
 def format_of(path: Path, data: bytes | None = None) -> Format:
-    """The format of a file, by its suffix, and by its contents if formats share the suffix.
+    """The format of a file, from its suffix, and from its contents if several formats share the suffix.
 
-    data  the contents; None if the file is to be written
-    Raises InputError for a file of no known format.
+    data  the contents; None for a file that will be written
+    Raises InputError if the format is unknown.
     """
     formats = by_suffix(path)
     if not formats:
@@ -56,7 +56,7 @@ def format_of(path: Path, data: bytes | None = None) -> Format:
 
 
 def _hint(path: Path, error: OSError | ValueError) -> str:
-    """How to mend the path of a file that cannot be read."""
+    """A hint that suggests a correction of the path of a file that cannot be read."""
     if not isinstance(error, FileNotFoundError):
         return str(getattr(error, "strerror", "") or "")
     if not path.parent.is_dir():
@@ -66,7 +66,7 @@ def _hint(path: Path, error: OSError | ValueError) -> str:
 
 
 def read(file: str | os.PathLike[str]) -> Measurement:
-    """The table in a file, which is read again only if the file has changed.
+    """Read the table in a file. Tables are cached, and a file is read again only if it has changed.
 
     file  a path, followed by :ITEM if the file holds several materials
     Raises InputError for files that are missing, damaged, or of unknown format.

@@ -1,4 +1,4 @@
-"""The angles over which tables are stored, computed accurately near the normal and near grazing."""
+"""Angular coordinates of tables, computed accurately near the normal and at grazing angles."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ HALF_PI = 0.5 * ops.pi
 
 @function
 def elevation(w: Direction) -> Scalar:
-    """The angle to the normal, [0, pi]."""
+    """The angle between a direction and the normal, in [0, pi]."""
     return ops.atan2(ops.safe_sqrt(sqr(w.x) + sqr(w.y)), w.z)
 
 
 @function
 def azimuth(w: Direction) -> Scalar:
-    """The angle about the normal from x, (-pi, pi]; 0 at the normal."""
+    """The azimuth of a direction about the normal, measured from x, in (-pi, pi]; 0 at the normal."""
     at_pole = (w.x == 0.0) & (w.y == 0.0)
     return where(at_pole, 0.0, ops.atan2(w.y, where(at_pole, 1.0, w.x)))
 
 
 @function
 def between(wo: Direction, wi: Direction) -> Scalar:
-    """|phi_i - phi_o|, [0, pi]; 0 where one of them is the normal."""
+    """|phi_i - phi_o|, in [0, pi]; 0 if one of the directions is the normal."""
     cross = wo.x * wi.y - wo.y * wi.x
     along = wo.x * wi.x + wo.y * wi.y
     none = (cross == 0.0) & (along == 0.0)
@@ -36,10 +36,10 @@ def between(wo: Direction, wi: Direction) -> Scalar:
 
 @function
 def half_difference(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar]:
-    """theta_h, theta_d and phi_d of a pair (Rusinkiewicz1998), phi_d of wi, in (-pi, pi].
+    """theta_h, theta_d and phi_d of a pair of directions (Rusinkiewicz1998); phi_d is that of wi, in (-pi, pi].
 
-    sin theta_d = |wi - wo| / 2 and cos theta_d = |wi + wo| / 2, without cancellation. In the frame with the half vector
-    above x, phi_d is the azimuth of wi - wo.
+    sin theta_d = |wi - wo| / 2 and cos theta_d = |wi + wo| / 2 avoid cancellation. phi_d is the azimuth of wi - wo in
+    the frame whose x-z plane contains the half vector.
     """
     flat, length, along, side = _half_frame(wo, wi)
     theta_h = ops.atan2(flat, wo.z + wi.z)
@@ -62,7 +62,8 @@ def half_difference_arrays(wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floa
 
 @function
 def half_difference_vectors(wo: Direction, wi: Direction) -> tuple[Direction, Direction]:
-    """The half vector, rotated above x, and wi in its frame: unit vectors with the angles of `half_difference`."""
+    """The half vector, rotated about the normal into the x-z plane, and the difference vector, which is wi in the frame
+    of the half vector: unit vectors with the angles of `half_difference`."""
     flat, length, along, side = _half_frame(wo, wi)
     scale = 1.0 / where(length == 0.0, 1.0, length)
     return vec3(flat * scale, 0.0 * flat, (wo.z + wi.z) * scale), vec3(0.5 * along, 0.5 * side, 0.5 * length)
@@ -70,8 +71,11 @@ def half_difference_vectors(wo: Direction, wi: Direction) -> tuple[Direction, Di
 
 @function
 def _half_frame(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """The length along the surface and the full length of h = wo + wi; the components of wi - wo along the first two
-    axes of the frame of h, (cos theta_h c, cos theta_h s, -sin theta_h) and (-s, c, 0)."""
+    """Two lengths of h = wo + wi, that of its projection onto the surface and its own, and two components of wi - wo.
+
+    These are the components along the first two axes of the frame of h, (cos theta_h c, cos theta_h s, -sin theta_h)
+    and (-s, c, 0).
+    """
     h, d = wo + wi, wi - wo
     flat = ops.safe_sqrt(sqr(h.x) + sqr(h.y))
     length = ops.safe_sqrt(dot(h, h))
@@ -84,6 +88,6 @@ def _half_frame(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar, S
 
 
 def direction(theta: Scalar, phi: Scalar) -> Direction:
-    """The unit vector at an elevation and an azimuth."""
+    """The unit vector at an angle theta to the normal and an azimuth phi."""
     (s, c), (sin_phi, cos_phi) = ops.sincos(theta), ops.sincos(phi)
     return vec3(s * cos_phi, s * sin_phi, c)

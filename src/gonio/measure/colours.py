@@ -1,8 +1,9 @@
-"""From spectra to linear sRGB and back, for tables measured by wavelength.
+"""Convert spectra to linear sRGB and back, for tables that are measured by wavelength.
 
-A reflectance is viewed under D65 by the CIE 1931 observer, in the Gaussian fits of Wyman2013 (with errors of at most
-1 % of the peak; the white of a flat reflectance is exact by normalization). The inverse gives the smoothest spectrum of
-a color, a linear map, so that color -> spectrum -> color is the identity.
+The color of a reflectance is computed for illuminant D65 and the CIE 1931 observer, whose color matching functions are
+the Gaussian fits of Wyman2013 (with errors of at most 1 % of the peak). By normalization, a constant reflectance is
+exactly gray. The inverse is a linear map that gives the smoothest spectrum with a given color, so the color of this
+spectrum is the original color.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from ..optics.colour import D65, LUMINANCE, XYZ_TO_RGB, Floats, observer
 
 __all__ = ["D65", "LUMINANCE", "XYZ_TO_RGB", "observer", "to_rgb", "to_spectrum"]
 
-STEPS = 4  # intervals between two wavelengths, in which measured values are interpolated linearly
+STEPS = 4  # integration steps between two measured wavelengths; values are interpolated linearly
 
 
 @lru_cache
@@ -36,12 +37,12 @@ def _to_rgb(wavelengths: tuple[float, ...]) -> Floats:
 
 
 def to_rgb(wavelengths: Floats) -> Floats:
-    """The matrix (N, 3) from values at increasing wavelengths [nm] to linear sRGB; constant values give gray."""
+    """The (N, 3) matrix from values at increasing wavelengths [nm] to linear sRGB; constant values give gray."""
     return _to_rgb(tuple(map(float, wavelengths)))
 
 
 def to_spectrum(wavelengths: Floats) -> Floats:
-    """The matrix (3, N) from linear sRGB to the smoothest values at these wavelengths that have the color."""
+    """The (3, N) matrix that converts linear sRGB to the smoothest spectrum of this color at the given wavelengths."""
     weights = to_rgb(wavelengths)
     count = len(weights)
     if np.linalg.matrix_rank(weights) < 3:

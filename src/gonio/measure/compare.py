@@ -22,11 +22,11 @@ from .tables.samples import Samples
 PAIRS = 1 << 16
 ROUNDS = 16
 SURE = 0.03
-GRAZING = 0.03  # smallest cosine of the view: within 1.7 degrees of the horizon, every format extrapolates
+GRAZING = 0.03  # smallest cosine of the view direction: within 1.7 degrees of the horizon, every format extrapolates
 
 
 class Comparable(Protocol):
-    """An object that `difference` can compare."""
+    """The interface that `difference` requires of the objects it compares."""
 
     @property
     def rgb(self) -> Callable[[Floats, Floats], Floats]: ...
@@ -37,13 +37,13 @@ class Comparable(Protocol):
 
 
 def difference(table: Comparable, other: Comparable, pairs: int = PAIRS, seed: int = 1) -> float:
-    """E |other - table| / E |table| of f cos theta_i, averaged over the channels, for views of uniform cosine and
-    light from all directions.
+    """The relative difference of two tables, E |other - table| / E |table|, where E is the mean of f cos theta_i.
 
-    The pairs are sampled by the densities of the two tables and by the cosine, a third each, so that narrow lobes count
-    by their energy; each is weighted by the inverse density of the mixture. Rounds of `pairs` continue until the
-    relative standard error of the result is below `SURE`, or `ROUNDS` are done: a spike where all three densities are
-    low requires many.
+    The mean is taken over the channels, over view directions with uniformly distributed cosines, and over all
+    directions of light. A third each of the directions of light is sampled from the density of either table and from
+    the cosine, and weighted by the inverse density of the mixture, so narrow lobes contribute according to their
+    energy. Rounds of samples continue until the relative standard error of the result is below `SURE`, but at most for
+    `ROUNDS` rounds; many are necessary if there is a spike where all three densities are low.
 
     pairs  pairs of directions per round
     seed   seed of the pairs
@@ -61,7 +61,7 @@ def difference(table: Comparable, other: Comparable, pairs: int = PAIRS, seed: i
 def _round(
     table: Comparable, other: Comparable, pairs: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """|other - table| and |table| at random pairs, divided by their density."""
+    """|other - table| and |table| at random pairs of directions, divided by the density of each pair."""
     types = backend.types("float64")
     mu, phi = rng.uniform(GRAZING, 1.0, pairs), rng.uniform(0.0, 2.0 * np.pi, pairs)
     sin = np.sqrt(1.0 - mu * mu)
@@ -89,15 +89,15 @@ class Converted:
     """A table in another format.
 
     path         the file
-    kind         kind of the table in it
-    resampled    whether its values were computed by evaluating the source; otherwise the numbers are the same
-    error        its difference from the source, see `difference`
-    size         bytes
-    resolution   the part of the error due to the size of the cells: the difference of the file from the source's
-                 reciprocal part
-    reciprocity  the part due to a format that stores one value for a pair and its swapped pair: the difference of the
-                 reciprocal part from the source. The two parts overlap
-    measured     the directions at which the source is measured, if the file states values at others too; else ""
+    kind         kind of the table in the file
+    resampled    whether the values were computed by evaluating the source; otherwise they were copied
+    error        difference between the file and the source, see `difference`
+    size         size of the file in bytes
+    resolution   the part of the error due to the size of the cells: the difference between the file and the reciprocal
+                 part of the source
+    reciprocity  the part of the error due to a format that stores one value for a pair of directions and its swapped
+                 pair: the difference between the reciprocal part and the source. The two parts of the error overlap
+    measured     the directions at which the source is measured; "" if the file has values at no other directions
     """
 
     path: Path
@@ -114,7 +114,10 @@ class Converted:
 
 
 class ReciprocalPart:
-    """A table with one value f per pair and its swapped pair, fitted to both as in `half_difference.sampled`."""
+    """The reciprocal part of a table: a pair of directions and its swapped pair share one value of f.
+
+    This value is the least-squares fit to both, as in `half_difference.sampled`.
+    """
 
     def __init__(self, table: Measurement) -> None:
         self.draw, self.pdf, self._rgb = table.draw, table.pdf, table.rgb
@@ -125,10 +128,12 @@ class ReciprocalPart:
 
 
 def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi: int | None = None) -> Converted:
-    """Write a table in the format of the output's suffix; its error is measured on the written file.
+    """Convert a measurement file to another format, and measure the error of the written file.
 
-    source  a file, as `read` takes it
-    phi     cells of phi_d in a MERL file: 180, or 360 for nonreciprocal tables; None: as `Merl.resampled` chooses
+    source  the file to convert, as for `read`
+    output  the file to write; its suffix determines the format
+    phi     number of cells along phi_d in a MERL file: 180, or 360 for nonreciprocal tables; None uses the default of
+            `Merl.resampled`
     Raises InputError if the source cannot be read, or the format cannot be written.
     """
     table, path = read(source), Path(output)
@@ -154,7 +159,7 @@ def convert(source: str | os.PathLike[str], output: str | os.PathLike[str], phi:
 
 
 def _measured(table: Measurement, made: Measurement) -> str:
-    """The directions at which a table is measured, if another one made from it states values at others too."""
+    """The directions at which a table is measured, if a table made from it also has values at other directions."""
     if isinstance(table, Samples) and not isinstance(made, Samples):
         return f"at {len(table.values)} pairs of directions"
     if made.angular_range.within(table.angular_range) != made.angular_range:
@@ -163,12 +168,15 @@ def _measured(table: Measurement, made: Measurement) -> str:
 
 
 def _swapped(table: Measurement, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-    """f of pairs, and of the same pairs with directions swapped."""
+    """f for pairs of directions, and f for the same pairs swapped."""
     return table.rgb(wo, wi) / wi[:, 2:], table.rgb(wi, wo) / wo[:, 2:]
 
 
 def asymmetry(table: Measurement, pairs: int = 1 << 14) -> float:
-    """E |f(wo, wi) - f(wi, wo)| / E f for cosine-distributed pairs: 0 if the table is reciprocal."""
+    """The deviation from reciprocity, E |f(wo, wi) - f(wi, wo)| / E |f|, where E is the mean over pairs of directions.
+
+    Both directions are cosine-distributed. The result is 0 for a reciprocal table.
+    """
     rng = np.random.default_rng([1, 84])
     u, v = rng.random((2, pairs)), rng.random((2, pairs)) * 2.0 * np.pi
     wo, wi = (

@@ -16,11 +16,13 @@ from .tables.base import ANGLES, Measurement
 
 
 def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
-    """The content of a file: format, kind, dimensions, range of the values, measured angles ("known"), flaws, albedo
-    by angle of view, reciprocity.
+    """Describe the table in a file.
 
-    If the file has several materials and none is named, the result has only their names ("items").
-    Raises InputError as `read` does.
+    Returns its format, kind, dimensions and range of values, the range of measured angles ("known"), its flaws, the
+    albedo by viewing angle, and the deviation from reciprocity.
+
+    If the file has several materials and none is named, the result contains only their names ("items").
+    Raises InputError under the same conditions as `read`.
     """
     text, item = parted(os.fspath(file))
     path = Path(os.path.expanduser(text))
@@ -55,7 +57,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _typical_error(table: Measurement) -> float | None:
-    """The median of the standard errors relative to their values; None if there are none."""
+    """The median relative standard error of the values; None if the table has no standard errors."""
     error, values = table.beside.get("error"), vars(table).get("values")
     if error is None or values is None or not np.any(values > 0.0):
         return None
@@ -63,7 +65,7 @@ def _typical_error(table: Measurement) -> float | None:
 
 
 def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
-    """The description as lines of text, (name, value) each."""
+    """The description as rows of text, each a pair (name, value)."""
     if "items" in about:
         return [("format", about["format"]), ("holds", ", ".join(about["items"]))]
     nm = about["wavelengths"]
@@ -81,16 +83,16 @@ def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
         ("measured", str(AngularRange(*map(tuple, about["known"].values())))),
     ]
     if about["error"] is not None:
-        rows.append(("error", f"{100.0 * about['error']:.3g} % in the median, a standard error for each value"))
+        rows.append(("error", f"{100.0 * about['error']:.3g} % (median of the relative standard errors)"))
     for flaw, share in about["flaws"].items():
-        rows.append((flaw, f"{100.0 * share:.3g} % of the values, kept as they are" if share else "none"))
+        rows.append((flaw, f"{100.0 * share:.3g} % of the values, left unchanged" if share else "none"))
     low, high = about["known"]["view"]
     for angle, row in zip(about["albedo"]["angles"], about["albedo"]["rgb"], strict=True):
         if low <= angle <= high:
             rows.append((f"albedo at {angle:g}", "  ".join(f"{x:.4f}" for x in row)))
     highest = about["albedo"]["highest"]
-    rows.append(("energy", f"gives back {highest:.4g} of the light at most" + (": a gain" if highest > 1.0 else "")))
+    rows.append(("energy", f"albedo of at most {highest:.4g}" + (", a gain of energy" if highest > 1.0 else "")))
     rows.append(
-        ("reciprocity", f"exchanging both directions changes f by {100.0 * about['reciprocity']:.3g} % on average")
+        ("reciprocity", f"swapping the two directions changes f by {100.0 * about['reciprocity']:.3g} % on average")
     )
     return [(what, text) for what, text in rows if text]

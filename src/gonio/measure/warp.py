@@ -1,15 +1,15 @@
-"""Densities on the unit square given on a grid, sampled and inverted exactly.
+"""Densities on the unit square, tabulated on a grid, with an exact sampling method and its exact inverse.
 
     warp = Warp("normals", values)                   # (slices, rows, columns), >= 0, nodes on the square's edges
     place, pdf = warp.sample(slices, u, v)
-    place, pdf = warp.invert(slices, x, y)           # the numbers that `sample` would have needed
+    place, pdf = warp.invert(slices, x, y)           # the numbers for which `sample` returns (x, y)
 
-Between nodes, the density is bilinear. A slice is one density with integral 1; a mixture of slices, such as the two
-nearest angles of view, is given as pairs (slice, weight) with weights that sum to 1: it is sampled by the mixed
-cumulative sums, so that `sample` and `invert` are exact inverses of each other (Dupuy2018, sec. 4.3).
+The density is bilinear between nodes. A slice is one density, with integral 1. A mixture of slices, such as those of
+the two nearest viewing angles, is given as pairs (slice, weight), whose weights sum to 1. It is sampled with the mixed
+cumulative sums, so `sample` and `invert` are exact inverses of each other (Dupuy2018, sec. 4.3).
 
-Rows are selected first, by the marginal of y; then x in the mixed row. The two densities are piecewise linear with
-quadratic cumulative sums; the root is computed in the form that is also valid for a constant density.
+First y is sampled from its marginal density, then x from the mixed row. Both densities are piecewise linear, and their
+cumulative sums are quadratic; the root is computed in a form that is also valid for a constant density.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from .. import ops
 from ..ops import Scalar, Table, fetch, function, where
 
-Slices = Sequence[tuple[Scalar, Scalar]]  # (slice, weight) each
+Slices = Sequence[tuple[Scalar, Scalar]]  # pairs (slice, weight)
 
 
 class Place(NamedTuple):
-    """A point of the unit square, and the density there."""
+    """A point of the unit square, and the density at this point."""
 
     x: Scalar
     y: Scalar
@@ -36,7 +36,7 @@ class Place(NamedTuple):
 
 
 def named(stem: str, values: NDArray[np.float64]) -> Table:
-    """A table with a unique name, since one shader may contain two measured materials."""
+    """A table with a unique name, because a shader may contain two measured materials."""
     values = np.ascontiguousarray(values, dtype=np.float64)
     return Table(f"{stem}_{hashlib.sha256(values.tobytes()).hexdigest()[:8]}", values)
 
@@ -44,7 +44,7 @@ def named(stem: str, values: NDArray[np.float64]) -> Table:
 class Warp:
     """Bilinear densities over the unit square, one per slice.
 
-    values  (slices, rows, columns), >= 0: at least 2 x 2 nodes; a slice of zeros is treated as uniform
+    values  (slices, rows, columns), not negative, with at least 2 x 2 nodes; a slice of zeros is treated as uniform
     """
 
     def __init__(self, stem: str, values: NDArray[np.floating]) -> None:
@@ -65,7 +65,7 @@ class Warp:
 
     @function
     def _mixed(self, slices: Slices, row: Scalar, column: Scalar) -> tuple[Scalar, Scalar]:
-        """Density at a node, and its integral along x up to there."""
+        """The density at a node, and its integral along x up to this node."""
         density: ops.Value = 0.0
         below: ops.Value = 0.0
         for one, weight in slices:
@@ -82,7 +82,7 @@ class Warp:
 
     @function
     def pdf(self, slices: Slices, x: Scalar, y: Scalar) -> Scalar:
-        """The density at a point; outside the square, that at the nearest edge."""
+        """The density at a point; outside the square, the density at the nearest point of its edge."""
         row, ty = _cell(y, self.rows)
         column, tx = _cell(x, self.columns)
         near, far = (
@@ -95,7 +95,7 @@ class Warp:
 
     @function
     def sample(self, slices: Slices, u: Scalar, v: Scalar) -> Place:
-        """The point for two uniform numbers, and its density."""
+        """The point for two uniform random numbers, and its density."""
         row = search(lambda at: self._marginal(slices, at), self.rows, v)
         r0 = self._mixed(slices, row, self._last(row))[1]
         r1 = self._mixed(slices, row + 1.0, self._last(row))[1]
@@ -131,7 +131,7 @@ class Warp:
 
 
 def search(below: Callable[[Scalar], Scalar], count: int, wanted: Scalar) -> Scalar:
-    """The last of the nodes 0 .. count - 2 at which a monotonic sum is <= `wanted`, by bisection."""
+    """Find by bisection the last of the nodes 0 .. count - 2 at which a monotonically increasing sum is <= `wanted`."""
     index = wanted * 0.0
     step = 1 << max((count - 2).bit_length() - 1, 0)
     while step and count > 2:
@@ -143,13 +143,13 @@ def search(below: Callable[[Scalar], Scalar], count: int, wanted: Scalar) -> Sca
 
 @function
 def _root(rest: Scalar, low: Scalar, high: Scalar) -> Scalar:
-    """t in [0, 1] with t low + t^2 (high - low) / 2 = rest."""
+    """The root t in [0, 1] of t low + t^2 (high - low) / 2 = rest."""
     root = ops.safe_sqrt(low * low + 2.0 * rest * (high - low))
     return ops.clamp(ops.safe_div(2.0 * rest, low + root), 0.0, 1.0)
 
 
 def _cell(x: Scalar, count: int) -> tuple[Scalar, Scalar]:
-    """The node before a coordinate in [0, 1], and the fraction of the way to the next."""
+    """The node before a coordinate in [0, 1], and the fraction of the distance to the next node."""
     at = ops.clamp(x, 0.0, 1.0) * (count - 1.0)
     cell = ops.minimum(ops.floor(at), count - 2.0)
     return cell, at - cell
@@ -162,7 +162,7 @@ def _mix(low: Scalar, high: Scalar, t: Scalar) -> Scalar:
 
 
 class Nodes:
-    """An axis with unevenly spaced nodes: at least two, or a single one that stands for all coordinates."""
+    """An axis with unevenly spaced nodes: at least two, or a single node for all coordinates."""
 
     def __init__(self, stem: str, nodes: NDArray[np.floating]) -> None:
         self.count = len(nodes)
@@ -173,7 +173,7 @@ class Nodes:
         return fetch(self.table, node)[0]
 
     def find(self, x: Scalar) -> tuple[Scalar, Scalar]:
-        """The node before a coordinate, and the fraction of the way to the next, clamped to [0, 1]."""
+        """The node before a coordinate, and the fraction of the distance to the next node, clamped to [0, 1]."""
         if self.count == 1:
             return x * 0.0, x * 0.0
         cell = search(self.at, self.count, x)

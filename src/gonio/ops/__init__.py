@@ -1,8 +1,9 @@
 """The vocabulary in which a material is written.
 
-The functions below compute on Dr.Jit arrays (32 or 64 bits, with autodiff), or record a typed graph when they are given
-symbols (`gonio.ops.graph`). The same lines of a model therefore serve renders, gradients, the float64 oracle and shader
-code. Two rules follow: no Python `if` on a value (use `where`), and no loop whose length depends on a value.
+The functions below operate on Dr.Jit arrays, in single or double precision and with automatic differentiation, or
+record a typed graph if they are given symbols (`gonio.ops.graph`). The same lines of a model are therefore used for
+renders, gradients, float64 reference values and shader code. Two rules follow: no Python `if` on a value (use `where`),
+and no loop whose length depends on a value.
 
     from gonio import ops
     ops.where(x > 0, ops.sqrt(x), 0.0)
@@ -118,7 +119,8 @@ def where(mask: Mask | bool, a: Scalar | float, b: Scalar | float) -> Scalar: ..
 @overload
 def where(mask: Mask | bool, a: Mask, b: Mask) -> Mask: ...
 def where(mask: Value, a: Value, b: Value) -> Value:
-    """`a` where `mask` holds, else `b`; both are computed. Plain numbers get the precision of the running formula."""
+    """`a` where `mask` is true, else `b`; both are computed. Plain numbers take the precision of the running
+    formula."""
     if isinstance(mask, Node) or isinstance(a, Node) or isinstance(b, Node):
         if isinstance(mask, bool):
             return a if mask else b
@@ -131,7 +133,7 @@ def where(mask: Value, a: Value, b: Value) -> Value:
 
 @function
 def pow(x: Scalar, y: Scalar | float) -> Scalar:
-    """x ** y for x > 0; 0 for x <= 0, so that neither shaders nor gradients see a power of a negative number."""
+    """x ** y for x > 0; 0 for x <= 0, so that neither shaders nor gradients contain a power of a negative number."""
     positive = x > 0.0
     return where(positive, exp(y * log(where(positive, x, 1.0))), 0.0)
 
@@ -150,7 +152,7 @@ def is_single(x: Value) -> bool:
 
 
 def is_short(x: Value) -> bool:
-    """Whether x is computed in 32 bits, by Dr.Jit or a shader, so that steps below float32 precision can be omitted."""
+    """Whether x is computed in float32, by Dr.Jit or a shader, so that steps beyond this precision can be omitted."""
     if isinstance(x, Node):
         return graph._stack[-1][0].single
     return is_single(x)
@@ -172,7 +174,8 @@ def fma(a: Scalar | float, b: V, c: V | Scalar | float) -> V: ...
 @overload
 def fma(a: Scalar | float, b: Scalar | float, c: V) -> V: ...
 def fma(a: Value, b: Value, c: Value) -> Value:
-    """a b + c: in float32 fused and rounded once; in float64, the reference, each is rounded as in NumPy."""
+    """a b + c. In float32, it is fused and rounded once; in float64, the reference, product and sum are rounded as in
+    NumPy."""
     return drjit().fma(a, b, c) if is_single(a) or is_single(b) or is_single(c) else a * b + c
 
 
@@ -189,7 +192,7 @@ def clamp(x: T, low: T | float, high: T | float) -> T:
 
 
 def rsqrt(x: T) -> T:
-    """1 / sqrt(x); in float32 computed from the processor's estimate and one Newton step, within 2 ulp."""
+    """1 / sqrt(x). In float32, it is computed from the processor's estimate and one Newton step, to within 2 ulp."""
     return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
 
 
@@ -204,7 +207,7 @@ def ones_like(x: T) -> T:
 
 
 def _guarded(mask: Value, x: Value) -> Value:
-    """x where the mask holds, else 1, so that the gradient of the unused branch is finite."""
+    """x where the mask is true, else 1, so that the gradient of the unused branch is finite."""
     return where(mask, x, 1.0) if not is_drjit(x) or drjit().grad_enabled(x) else x
 
 
@@ -240,7 +243,7 @@ def vec3(x: Scalar | float, y: Scalar | float, z: Scalar | float) -> Direction:
 
 
 def _vector(kind: str, *parts: Value) -> Value:
-    """A vector of symbols or Dr.Jit values; plain numbers take the type of the formula that is running."""
+    """A vector of symbols or Dr.Jit values; plain numbers take the type of the running formula."""
     if not any(is_drjit(part) for part in parts):
         parts = (in_formula(parts[0]), *parts[1:])
     for part in parts:

@@ -21,7 +21,7 @@ from .. import files, llvm
 from ..errors import InputError, MachineError
 from .types import Precision, Value
 
-# A Dr.Jit array. Dr.Jit's stubs describe one device and precision; Gonio's code serves all.
+# A Dr.Jit array. Dr.Jit's stubs describe one device and precision; Gonio's code is used for all.
 Array: TypeAlias = Value
 
 PRECISIONS = get_args(Precision)
@@ -63,7 +63,7 @@ def check_kernels() -> None:
     """Raise MachineError if other users may change the folder of compiled kernels, which Dr.Jit runs."""
     named, home = os.environ.get("DRJIT_CACHE_DIR"), os.environ.get("HOME")
     if not (named or home):
-        return  # without a home directory Dr.Jit stores no kernels
+        return  # without a home directory, Dr.Jit stores no kernels
     folder = Path(named) if named else Path(str(home), ".drjit")
     if folder.is_dir() and files.changeable_by_others(folder):
         hint = f"chmod go-w '{folder}', or set DRJIT_CACHE_DIR to a folder of your own"
@@ -89,7 +89,7 @@ def _types(backend: str, double: bool) -> Types:
 
 
 def types(precision: Precision | None = None) -> Types:
-    """The CPU types of a precision, None for the current one; small arrays are computed on the CPU."""
+    """The CPU types of a precision, or of the current one if it is None; small arrays are computed on the CPU."""
     precision = _precision if precision is None else precision
     if not isinstance(precision, str) or precision not in PRECISIONS:
         raise InputError(f"unknown precision '{precision}'", "precision", 'give "float32" or "float64"')
@@ -104,7 +104,7 @@ def types_like(kind: type) -> Types:
 
 
 def is_drjit(value: object) -> TypeGuard[Array]:
-    """Whether a value is a Dr.Jit array; does not load Dr.Jit."""
+    """Whether a value is a Dr.Jit array. This function does not load Dr.Jit."""
     dr = sys.modules.get("drjit")
     is_array = getattr(dr, "is_array_v", None)  # missing while another thread is still importing Dr.Jit
     return is_array is not None and is_array(value)

@@ -1,4 +1,4 @@
-"""Recorded operations in NumPy float64."""
+"""Evaluation of recorded operations in NumPy float64."""
 
 from __future__ import annotations
 

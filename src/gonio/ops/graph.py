@@ -42,7 +42,8 @@ class RecordingError(GonioError):
 
 
 class ForbiddenOperator(RecordingError):
-    """Code applies a Python operator to a value for which it has no meaning or another one: `if`, `and`, `**`."""
+    """Code applies a Python operator, such as `if`, `and` or `**`, to a value for which it has no meaning or a
+    different one."""
 
 
 foreign = ""  # "file:line" of the text that is being read, if the values do not come from Python code
@@ -65,7 +66,7 @@ def _logical(op: str) -> Callable[[Node, object], Node]:
 class Node:
     """One value in a recorded function: an operation, its arguments, its type and its source line.
 
-    name  name of the Python variable that held it, or ""; in a tuple or dict followed by the key, "result.bend"
+    name  name of the Python variable that held it, or ""; for an item of a tuple or dict with its key, "result.bend"
     """
 
     __slots__ = ("args", "depth", "function", "index", "name", "op", "source", "static", "type")
@@ -140,7 +141,7 @@ class Node:
 class Function:
     """A recorded function.
 
-    name, doc, source  of the Python function it came from
+    name, doc, source  name, docstring and source line of the Python function
     parameters         name -> type, in order; "self.alpha" is the field `alpha` of the model
     arguments          name -> the argument: nodes, objects and tuples of nodes
     nodes              every value, in order of evaluation
@@ -172,8 +173,8 @@ class Graph:
     """Recorded functions in order of definition; `entry` is the last.
 
     replacements  operation -> a vocabulary function to record instead, for languages without the operation
-    single        whether it is recorded for 32 bits; see `ops.is_short`
-    named         whether values get the names of the variables that hold them, which takes nine tenths of the time
+    single        whether it is recorded for float32; see `ops.is_short`
+    named         whether values are named after the variables that hold them, which takes nine tenths of the time
     """
 
     def __init__(
@@ -260,7 +261,7 @@ def type_of(value: object) -> str:
 
 
 def widest(*values: object) -> str:
-    """The type of an elementwise operation: floats broadcast to the one wider type."""
+    """The type of the result of an elementwise operation: floats broadcast to the wider type."""
     types = {type_of(v) for v in values} - {"float"}
     if len(types) > 1:
         raise RecordingError(f"an operation mixes {' and '.join(sorted(types))}", _source_line())
@@ -358,7 +359,7 @@ def call(python_function: Callable, args: tuple, kwargs: dict, *, constants: boo
 def unnamed() -> Iterator[None]:
     """A context in which the current function records values without names.
 
-    The variables of an interpreter say nothing about the program that it runs, and searching them takes nine tenths of
+    The variables of an interpreter do not describe the program that it runs, and searching them takes nine tenths of
     the time. Values of functions that are defined inside the context are named as usual.
     """
     function = _stack[-1][1] if _stack else Function("outer", "", "")
@@ -370,7 +371,7 @@ def unnamed() -> Iterator[None]:
 
 
 def recording(values: tuple) -> bool:
-    """Whether any of the arguments holds a node."""
+    """Whether any of the arguments contains a node."""
     return bool(_stack) and any(True for value in values for _ in _flatten(value, ""))
 
 
@@ -386,7 +387,7 @@ def record(
     """Record a function of named arguments.
 
     types  argument name -> "float", "bool", "vec2", "vec3" or "spectrum"; may also be given as keywords
-    name   name of the function in the graph; "": its own
+    name   name of the function in the graph; by default, its own name
     into   an empty graph to record into, for a graph with replacements
     more   arguments that are not symbols, passed on unchanged; objects may have symbolic fields
     """

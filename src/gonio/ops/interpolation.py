@@ -53,10 +53,11 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
 
 
 def fetch(table: Table, *places: Scalar | float) -> tuple[Scalar, ...]:
-    """Every channel of the texel at integer coordinates, one per axis; outside the table the nearest texel is used.
+    """Every channel of the texel at integer coordinates, one per axis; outside the table, the nearest texel is used.
 
-    For grids whose axes are not a plain [0, 1]: periodic angles, unevenly spaced nodes, cumulative sums to search in.
-    Coordinates given as plain numbers, such as the index of a network's weight, are constants in a shader.
+    It is intended for grids whose axes are not simply [0, 1], such as periodic angles, unevenly spaced nodes and
+    cumulative sums. Coordinates given as plain numbers, such as the index of a network's weight, are constants in a
+    shader.
     """
     if not any(isinstance(x, graph.Node) for x in places):
         places = tuple(in_formula(x) if isinstance(x, float) else x for x in places)

@@ -33,7 +33,8 @@ class LocalNames:
         self._searched: list[tuple[FrameType, dict[int, object]]] = []
 
     def search(self) -> None:
-        """Name the values that variables hold now. Called for every new value, while earlier variables still exist."""
+        """Name the values that variables hold now. It is called for every new value, while earlier variables still
+        exist."""
         frames = []
         frame: FrameType | None = sys._getframe(1)
         while frame is not None and frame.f_code is not self.outermost:

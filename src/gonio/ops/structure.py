@@ -70,7 +70,7 @@ def static_key(value: Value, kind: type[Any]) -> object:
         hash(value)
     except TypeError:
         return id(value)
-    # with the type, since True, 1 and 1.0 are equal keys; repr distinguishes 0.0 from -0.0
+    # with the type, because True, 1 and 1.0 are equal keys; repr distinguishes 0.0 from -0.0
     return (type(value), repr(value) if isinstance(value, float) else value)
 
 

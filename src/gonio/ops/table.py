@@ -45,7 +45,7 @@ class Table:
         return f"Table({self.name!r}, {' x '.join(map(str, self.shape))}, {self.channels} channels)"
 
     def array(self, kind: Types) -> Array:
-        """The values as an evaluated Dr.Jit array, cached per type: new contents compile no kernel."""
+        """The values as an evaluated Dr.Jit array, cached per type, so that new contents require no compilation."""
         if kind.float not in self._arrays:
             array = kind.float(self.values.ravel())
             drjit().make_opaque(array)

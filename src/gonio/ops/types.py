@@ -1,9 +1,9 @@
-"""The types of values, for readers, editors and type checkers. Nothing here runs.
+"""The types of values, for readers, editors and type checkers. Nothing in this module is executed.
 
-Inside a material every value is a Dr.Jit array with one entry per ray, or a symbol while the material is recorded; both
-have the operators below. The actual Dr.Jit type depends on device, precision and variant, so these classes state only
-the meaning: a `Scalar`, a `Mask`, a `Direction`, a `Spectrum`. They are never instantiated and never tested for; only
-the type checker enforces them.
+Inside a material, every value is a Dr.Jit array with one entry per ray, or a symbol while the material is recorded;
+both have the operators below. The actual Dr.Jit type depends on device, precision and variant, so these classes state
+only the meaning: a `Scalar`, a `Mask`, a `Direction`, a `Spectrum`. They are never instantiated or tested for; only the
+type checker enforces them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 Mode: TypeAlias = Literal["radiance", "importance"]
 Precision: TypeAlias = Literal["float32", "float64"]
 
-# A Dr.Jit value, whose type only Dr.Jit knows, or a symbol, in code that must distinguish the two
+# A Dr.Jit value, whose type is not expressible, or a symbol, in code that must distinguish the two
 Value: TypeAlias = Any
 
 
@@ -34,7 +34,7 @@ V = TypeVar("V", bound="Vector")
 
 
 class Scalar:
-    """A number per ray. With a `Vector` operators return the vector's type: scalar * color is a color."""
+    """A number per ray. With a `Vector`, operators return the vector's type: scalar * color is a color."""
 
     if TYPE_CHECKING:
 
@@ -56,7 +56,7 @@ class Scalar:
 
 
 class Vector:
-    """Several numbers per ray; operators work per component and broadcast a `Scalar`."""
+    """Several numbers per ray; operators act on each component and broadcast a `Scalar`."""
 
     if TYPE_CHECKING:
 

@@ -36,7 +36,8 @@ def spherical_direction(sin_theta: Scalar, cos_theta: Scalar, phi: Scalar) -> Di
     """The direction with polar angle theta, given by its sine and cosine, and azimuth phi. For NumPy arrays, see
     `spherical_array`.
 
-    Recorded formulas repeat these lines instead of calling this function, whose variable names the recorder would use.
+    Recorded formulas repeat these lines instead of calling this function, because the recorder would use its variable
+    names.
     """
     s, c = sincos(phi)
     return vec3(sin_theta * c, sin_theta * s, cos_theta)
@@ -61,7 +62,7 @@ def normal_like(like: Direction) -> Direction:
 
 @function
 def rotate(w: Direction, rotation: Pair | None) -> Direction:
-    """w in a frame rotated about z by an angle given as (cos, sin); None means no rotation."""
+    """w in a frame rotated about z by an angle given as (cos, sin)."""
     if rotation is None:  # decided in Python, so that no rotation is compiled
         return w
     return vec3(rotation.x * w.x + rotation.y * w.y, rotation.x * w.y - rotation.y * w.x, w.z)
@@ -85,7 +86,7 @@ def azimuth(w: Direction) -> Pair:
 
 
 def sin2(w: Direction) -> Scalar:
-    """Squared sine of the angle to the normal, computed from x and y, since 1 - z^2 would cancel near the normal."""
+    """Squared sine of the angle to the normal, computed from x and y, because 1 - z^2 would cancel near the normal."""
     return sqr(w.x) + sqr(w.y)
 
 
@@ -109,9 +110,10 @@ class _Lit(NamedTuple):
 
 
 def lit(wo: Direction, wi: Direction) -> _Lit:
-    """Whether both directions are above the surface, wo and wi; if either is below, both are replaced by the normal.
+    """Whether both directions are above the surface, then wo and wi; if either is below, both are replaced by the
+    normal.
 
-    Otherwise, masked lanes could introduce infinity or the root of a negative number into a gradient.
+    Without the replacement, masked lanes could introduce infinity or the root of a negative number into a gradient.
     """
     above = (wo.z > 0.0) & (wi.z > 0.0)
     return _Lit(above, where(above, wo, normal_like(wo)), where(above, wi, normal_like(wi)))

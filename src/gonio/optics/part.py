@@ -48,7 +48,7 @@ class Part:
     def lacks(self, what: str, method: str) -> MissingFormula:
         """The error for a call of a missing method.
 
-        what    what the class has or lacks, such as "no `D`", for the message
+        what    what the class has or lacks, for the message, such as "no `D`"
         method  signature of the method to write
         """
         return MissingFormula(f"{type(self).__name__} has {what}", self.place(), f"write {method}; see {GUIDE}")

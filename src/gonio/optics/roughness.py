@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..ops import Mask, Pair, maximum, vec2
 
-# Below this width the tilt of facets, about alpha, is less than 2000 times the rounding error of a float32 direction
+# Below this width, the tilt of facets, about alpha, is less than 2000 times the rounding error of a float32 direction
 # (6e-8), and the peak of D, 1 / (pi alpha^2), exceeds 3e7: the lobe cannot be resolved and is replaced by a mirror.
 SMOOTH = 1e-4
 

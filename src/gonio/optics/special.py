@@ -38,21 +38,21 @@ def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 @function
 def erfinv(x: Scalar) -> Scalar:
-    """Inverse error function on (-1, 1) by the polynomial of Giles2010; relative error about 4e-7.
+    """Inverse error function on (-1, 1) by the polynomial of Giles2010, with a relative error of about 4e-7.
 
-    This is the precision of float32; in float64 a Newton step reduces the error to 1e-12 up to |x| = 1 - 1e-7.
+    This is the precision of float32; in float64, a Newton step reduces the error to 1e-12 up to |x| = 1 - 1e-7.
     """
     w = -log((1.0 - x) * (1.0 + x))
     center = w < 5.0
     t = where(center, w - 2.5, sqrt(ops.maximum(w, 5.0)) - 3.0)
-    # outside a formula, `where` between two plain numbers returns 32 bits, so it selects between sums
+    # outside a formula, `where` between two plain numbers returns float32, so it selects between sums
     value = where(center, _CENTER[0] * t + _CENTER[1], _TAIL[0] * t + _TAIL[1])
     for a, b in zip(_CENTER[2:], _TAIL[2:], strict=True):
         value = where(center, value * t + a, value * t + b)
     y = value * x
     if is_short(x):
         return y
-    # exp(y^2) magnifies the rounding error of erf: farther out the polynomial is more accurate
+    # exp(y^2) magnifies the rounding error of erf; for a larger |y|, the polynomial is more accurate
     return where(abs(y) < 4.5, y - (erf(y) - x) * exp(sqr(y)) * (0.5 * SQRT_PI), y)
 
 
@@ -60,9 +60,10 @@ def erfinv(x: Scalar) -> Scalar:
 def gaussian_ramp(a: Scalar) -> Scalar:
     """int_-inf^a (a - x) exp(-x^2) dx / sqrt(pi) = a (1 + erf a) / 2 + exp(-a^2) / (2 sqrt(pi)), for a >= 0.
 
-    The integral over Gaussian slopes below a. In float32, it is a rational function with an error of 8e-8; with erf and
-    exp, Beckmann's pdf takes 1.8 times as long. The coefficients were fitted for Gonio by least squares of the relative
-    error at 4000 Chebyshev points, reweighted toward the largest error; for a >= 4, the value is a within 2e-10.
+    This is an integral over Gaussian slopes below a. In float32, it is computed by a rational function with an error of
+    8e-8; with erf and exp, Beckmann's pdf would take 1.8 times as long. The coefficients were fitted for Gonio by least
+    squares of the relative error at 4000 Chebyshev points, reweighted toward the largest error; for a >= 4, the value
+    is a to within 2e-10.
     """
     if not is_short(a):
         return 0.5 * a * (1.0 + erf(a)) + (0.5 / SQRT_PI) * exp(-sqr(a))
@@ -79,8 +80,8 @@ def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
 
 @function
 def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
-    """cos(theta)^p, computed from the squared sine where this is below 0.1: near 1, the cosine is rounded too coarsely
-    for large p.
+    """cos(theta)^p. Where the squared sine is below 0.1, the power is computed from it, because a cosine near 1 is
+    rounded too coarsely for a large p.
 
     log cos^2 = log(1 - sin^2) = 2 atanh(sin^2 / (sin^2 - 2)); the first omitted term is below 1e-18.
     """
@@ -94,8 +95,8 @@ def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
 
 @function
 def exprel(x: V) -> V:
-    """(e^x - 1) / x, and 1 at x = 0. Up to |x| = 1/2, it is computed by its series, whose first omitted term is below
-    2e-17 of the sum."""
+    """(e^x - 1) / x, and 1 at x = 0. Up to |x| = 1/2, it is computed from its series, whose first omitted term is less
+    than 2e-17 of the sum."""
     t = clamp(x, -0.5, 0.5)
     series = 1.0 + t * (1.0 / 13.0)
     for n in range(12, 1, -1):
@@ -125,15 +126,16 @@ def power_integral(log_t: Scalar, q: Scalar) -> Scalar:
 
 @function
 def power_quantile(area: Scalar, q: Scalar) -> Scalar:
-    """log t for which `power_integral` is `area`: the inverse distribution function of a power law."""
+    """log t at which `power_integral` equals `area`: the inverse distribution function of a power law."""
     return area * logrel(q * area)
 
 
 @function
 def log_share(q: Scalar, p: Scalar) -> Scalar:
-    """log q of a fraction q, given also p = 1 - q. For p <= 1/2, where log would cancel, it is 2 atanh(p / (p - 2)).
+    """log q of a fraction q, where p = 1 - q is given as well. For p <= 1/2, it is computed from p by the series of
+    2 atanh(p / (p - 2)), because the logarithm of a rounded q near 1 is inaccurate.
 
-    The first omitted term of the series is below 4e-10 of the sum.
+    The first omitted term of the series is less than 4e-10 of the sum.
     """
     t = minimum(p, 0.5)
     z = t / (t - 2.0)
@@ -146,7 +148,7 @@ def log_share(q: Scalar, p: Scalar) -> Scalar:
 
 @function
 def _stirling(x: Scalar) -> Scalar:
-    """The series of log Gamma beyond its leading terms; the first omitted term is below 2e-9 at x = 4."""
+    """Stirling's series of log Gamma without its leading terms; the first omitted term is less than 2e-9 at x = 4."""
     r = 1.0 / x
     r2 = sqr(r)
     series = 1 / 12 - r2 * (1 / 360 - r2 * (1 / 1260 - r2 * (1 / 1680 - r2 * (1 / 1188))))
@@ -157,9 +159,9 @@ def _stirling(x: Scalar) -> Scalar:
 def beta(a: Scalar, b: Scalar) -> Scalar:
     """Euler's beta function B(a, b) for a, b >= 1, without the cancellation of three log-gammas.
 
-    Both arguments are shifted up by three with B(a, b) = B(a + 1, b) (a + b) / a; then Stirling's series is used with
+    Both arguments are increased by three with B(a, b) = B(a + 1, b) (a + b) / a; Stirling's series is then used, with
     its leading terms combined into ratios. The relative error is below 1e-8 in float64 and about 1e-6 in float32.
-    Arguments above 1e8 are treated as 1e8, since their fourth power must not overflow float32.
+    Arguments above 1e8 are treated as 1e8, because their fourth power must not overflow float32.
     """
     a, b = minimum(a, 1e8), minimum(b, 1e8)
     ratio: Scalar | float = 1.0

@@ -25,7 +25,8 @@ def square_to_cosine_hemisphere_pdf(w: Direction) -> Scalar:
 def square_to_power_lobe(u1: Scalar, u2: Scalar, p: Scalar) -> Direction:
     """A direction about +z with density (p + 1) / (2 pi) cos(theta)^p on the upper hemisphere (Lafortune1994).
 
-    sin^2 is computed from the logarithm of the cosine: at p = 1e5, the difference 1 - cos^2 has no digits in float32.
+    sin^2 is computed from the logarithm of the cosine: at p = 1e5, the difference 1 - cos^2 has no correct digits in
+    float32.
     """
     log_cos = ops.log(1.0 - u1) / (p + 1.0)
     cos_theta = ops.exp(log_cos)

@@ -1,5 +1,7 @@
-"""Denoise pictures with Intel Open Image Denoise, which is installed with Gonio on platforms for which pyoidn has a
-wheel."""
+"""Denoise pictures with Intel Open Image Denoise (OIDN).
+
+OIDN is installed with Gonio on platforms for which there is a wheel of pyoidn.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ _HINT = f"{INSTALL}, or leave --denoise out"
 
 
 def available() -> str:
-    """The version of the installed pyoidn, "" if there is none. The library is not loaded."""
+    """The version of the installed pyoidn, or "" if it is not installed. The library is not loaded."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
@@ -22,16 +24,16 @@ def available() -> str:
 
 
 def require() -> None:
-    """Raise MachineError if OIDN is missing; to be called before a render, so that no time is lost."""
+    """Raise MachineError if OIDN is missing. This is called before a render, so that no time is lost."""
     if not available():
         raise MachineError("Open Image Denoise (pyoidn) is not installed", "--denoise", _HINT)
 
 
 def denoise(image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndarray | None = None) -> np.ndarray:
-    """The denoised picture: (H, W, 3) float32, linear, unbounded above.
+    """Denoise a picture, (H, W, 3), float32, of linear radiance without an upper bound.
 
-    albedo  surface color in [0, 1], noisy or not; preserves texture edges
-    normal  shading normals in [-1, 1]; preserves geometric edges; OIDN requires `albedo` with it
+    albedo  surface colors in [0, 1], which may be noisy; they preserve edges of textures
+    normal  shading normals in [-1, 1]; they preserve edges of geometry, and require `albedo`
     The result is biased: fine detail may be removed as noise. Values that are not finite are replaced by 0.
     Raises MachineError if OIDN is missing or fails, InputError for arrays of other shapes.
     """

@@ -1,6 +1,6 @@
-"""Exposure of a picture for a screen: stops, given or derived from the picture's luminance, and a check for clipping.
+"""The exposure of pictures for display: parsing, automatic exposure from the luminance, and a check for clipping.
 
-Pictures are linear RGB, float32, (H, W, 3); 1 is white at 0 stops, and each stop doubles the brightness.
+Pictures are linear RGB, float32, (H, W, 3). At 0 stops, the value 1 is white; each stop doubles the brightness.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from ..errors import InputError
 RGB = NDArray[np.float32]
 Exposure = float | Literal["auto"]
 
-MAX_CLIPPED = 0.01  # largest fraction of clipped pixels without a warning: highlights and lamps may clip
-WHITE = 1.1  # above 1, since a white furnace is 1 plus noise, and clipping that loses nothing visible
+MAX_CLIPPED = 0.01  # maximum fraction of clipped pixels without a warning, because highlights and lamps may clip
+WHITE = 1.1  # more than 1, because a white furnace is 1 plus noise, and clipping this noise has no visible effect
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # weights of linear sRGB (IEC 61966-2-1)
 
 
@@ -42,11 +42,12 @@ def check(exposure: Exposure) -> Exposure:
 
 
 def stops(exposure: Exposure, *pictures: RGB) -> float:
-    """The exposure in stops; "auto" is the brightest, in tenths of stops, at which at most 1 % of the lit pixels clip.
+    """The exposure in stops, where "auto" is determined from the luminance of the pictures.
 
-    A lamp or a sky may cover more of a picture than that and would darken everything else. The exposure is therefore at
-    least such that the mean of log luminance is 2 stops below middle gray, which Reinhard2002 puts at 18 % of white.
-    Black pixels are ignored; entirely black pictures get 0. Several pictures get one exposure.
+    The automatic exposure is the largest, in tenths of stops, at which at most 1 % of the lit pixels clip. A lamp or a
+    sky may cover more of a picture and would darken everything else. The exposure is therefore at least so large that
+    the mean of the log luminance is 2 stops below middle gray, which is 18 % of white (Reinhard2002). Black pixels are
+    ignored; for entirely black pictures, the exposure is 0. Several pictures have a common exposure.
     """
     if exposure != "auto":
         return exposure
@@ -60,9 +61,9 @@ def stops(exposure: Exposure, *pictures: RGB) -> float:
 
 
 def clipping(exposure: float, *pictures: RGB, automatic: bool = False) -> str:
-    """A warning for pictures that are too bright for a screen; "" if at most 1 % of the pixels are clipped.
+    """A warning for pictures that are too bright for a display; "" if at most 1 % of the pixels are clipped.
 
-    automatic  whether `stops` has chosen the exposure
+    automatic  whether the exposure was determined automatically by `stops`
     """
     pixels = _pixels(*pictures)
     clipped = float(np.mean(pixels.max(axis=1) * 2.0**exposure > WHITE)) if len(pixels) else 0.0
@@ -86,5 +87,5 @@ def _without_clipping(pixels: RGB) -> float:
 
 
 def _in_tenths(exposure: float) -> float:
-    """The exposure in tenths of stops, rounded down, since a brighter picture would clip more."""
+    """Round an exposure down to tenths of stops, because a brighter picture would clip more pixels."""
     return math.floor(10 * exposure + 1e-4) / 10

@@ -1,7 +1,7 @@
 """Decode untrusted picture files.
 
-The header of a file (sizes, chunks, attributes) is checked against the file's length before a C++ library reads it.
-Radiance files are decoded here, since Mitsuba's reader writes past its buffer if run lengths are wrong.
+Before a C++ library reads a file, its header (sizes, chunks, attributes) is checked against the length of the file.
+Radiance files are decoded by this module, because Mitsuba's reader writes beyond its buffer if run lengths are wrong.
 
     kind = formats.kind_of(content)
     values, integers = formats.decode(path, content, kind)      # (H, W, channels)
@@ -23,7 +23,8 @@ from ..bridge.faults.exr_threads import file_threads
 from . import openexr
 from .openexr import Claimed, Unreadable
 
-# DEFLATE, the densest compression here, expands a byte to at most 1032 bytes. A file that claims more is rejected.
+# DEFLATE, the most effective compression of these formats, expands a byte to at most 1032 bytes. If a header states a
+# larger size, the file is rejected.
 MAX_EXPANSION = 1032
 MAX_PIXELS = 1 << 28  # 16384 x 16384: 3 GiB as float32 RGB
 MAX_SIDE = 1 << 20  # limit of libpng
@@ -37,12 +38,12 @@ _MAGIC = {
 
 
 def kind_of(content: bytes) -> str | None:
-    """The format of a file by its first bytes: "PNG", "JPEG", "OpenEXR" or "RGBE"; None for any other."""
+    """The format of a file, from its first bytes: "PNG", "JPEG", "OpenEXR" or "RGBE"; None for other formats."""
     return next((kind for magic, kind in _MAGIC.items() if content.startswith(magic)), None)
 
 
 def check(content: bytes, kind: str) -> Claimed:
-    """Raise Unreadable if a file contradicts itself, or claims more than it can contain."""
+    """Raise Unreadable if a file is inconsistent, or if its header states more pixels than it can contain."""
     try:
         claimed = _HEADERS[kind](content)
         _check_size(claimed, len(content))
@@ -64,23 +65,26 @@ def _check_size(claimed: Claimed, length: int) -> None:
 
 
 class Decoded(NamedTuple):
-    """Values (H, W, channels), row 0 on top; those of integer formats (`integers`) are scaled to [0, 1]."""
+    """The values of a file, (H, W, channels), with row 0 on top.
+
+    integers  whether the format stores integers; their values are scaled to [0, 1]
+    """
 
     values: NDArray[np.float32]
     integers: bool
 
 
 def decode(path: Path, content: bytes, kind: str) -> Decoded:
-    """The values of a file with that content and of that `kind`. Raises Unreadable if it is damaged."""
+    """Decode a file with the given content and format. Raises Unreadable if it is damaged."""
     claimed = check(content, kind)
     if kind == "RGBE":
         return Decoded(_radiance(content, claimed), False)
     mi = engine.load()
     try:
-        # From the file instead of a stream of its content: Mitsuba's memory streams read beyond their end.
+        # Read from the file instead of a memory stream, because Mitsuba's memory streams read beyond their end.
         with file_threads():
             values = np.array(mi.Bitmap(mitsuba_path(path), getattr(mi.Bitmap.FileFormat, kind)))
-    except (RuntimeError, ValueError) as error:  # UnicodeDecodeError among them
+    except (RuntimeError, ValueError) as error:  # including UnicodeDecodeError
         raise Unreadable(_reason(error)) from None
     values = values if values.ndim == 3 else values[..., None]
     if values.dtype.kind == "f":
@@ -89,7 +93,7 @@ def decode(path: Path, content: bytes, kind: str) -> Decoded:
 
 
 def mitsuba_path(path: Path) -> str:
-    """The path of a file for Mitsuba. Raises Unreadable if it is not UTF-8."""
+    """The path of a file in the form that Mitsuba requires. Raises Unreadable if it is not valid UTF-8."""
     try:
         str(path).encode()
     except UnicodeEncodeError:
@@ -98,7 +102,7 @@ def mitsuba_path(path: Path) -> str:
 
 
 def _reason(error: Exception) -> str:
-    """Mitsuba's message without the class and the name of the stream."""
+    """The message of an error of Mitsuba, without the class and the name of the stream."""
     return re.sub(r'^\s*(\[[^\]]*\]\s*)?("[^"]*":\s*)?', "", str(error).strip().splitlines()[-1])[:200]
 
 
@@ -116,7 +120,7 @@ def _png(content: bytes) -> Claimed:
 
 
 def png_chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Kind and data of each chunk (ISO 15948, 5.3), up to IEND. Raises Unreadable if the file ends before it."""
+    """The type and data of each chunk up to IEND (ISO 15948, 5.3). Raises Unreadable if the file ends before IEND."""
     at, kind = 8, b""
     while kind != b"IEND":
         if at + 12 > len(content):
@@ -129,7 +133,7 @@ def png_chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _jpeg(content: bytes) -> Claimed:
-    """The size from the first start-of-frame segment (ITU T.81, B.2.2)."""
+    """The size stated in the first start-of-frame segment (ITU T.81, B.2.2)."""
     at = 2
     while content[at] == 0xFF:
         marker = content[at + 1]
@@ -149,8 +153,11 @@ _MAX_HEADER = 1 << 16  # bytes
 
 
 def _resolution(content: bytes) -> re.Match[bytes] | None:
-    """The resolution line after the first empty line. Mitsuba uses the first such line anywhere in the file, so a file
-    with another one in its header, even one that only Mitsuba would accept, is rejected."""
+    """The resolution line of a Radiance file, which follows the first empty line.
+
+    Mitsuba uses the first line of this form anywhere in the file. A file with another such line in its header is
+    therefore rejected, even if only Mitsuba would accept that line.
+    """
     empty = content.find(b"\n\n", 0, _MAX_HEADER)
     if empty < 0 or re.search(rb"-Y[^\n]*\+X", content[:empty]):
         return None
@@ -171,7 +178,7 @@ def _rgbe(content: bytes) -> Claimed:
 
 
 def _radiance(content: bytes, claimed: Claimed) -> NDArray[np.float32]:
-    """Red, green, blue of a Radiance picture [Ward's `color.c`]: three mantissas with a shared exponent."""
+    """Decode a Radiance picture, whose red, green and blue are mantissas with a shared exponent [Ward's `color.c`]."""
     resolution = _resolution(content)
     assert resolution is not None, "`check` has verified it"
     width, height = claimed.width, claimed.height
@@ -180,7 +187,7 @@ def _radiance(content: bytes, claimed: Claimed) -> NDArray[np.float32]:
         rgbe = _runs(data, width, height)
     elif len(data) >= 4 * width * height:
         rgbe = np.frombuffer(data, np.uint8, 4 * width * height).reshape(height, width, 4)
-        if np.any(np.all(rgbe[:, :, :3] == 1, axis=2)):  # marks a run of the old style
+        if np.any(np.all(rgbe[:, :, :3] == 1, axis=2)):  # the marker of an old-style run
             raise Unreadable("it has old-style run lengths, which are not supported")
     else:
         raise Unreadable("it is truncated")
@@ -190,8 +197,10 @@ def _radiance(content: bytes, claimed: Claimed) -> NDArray[np.float32]:
 
 
 def _runs(data: memoryview, width: int, height: int) -> NDArray[np.uint8]:
-    """Decode run-length coded scanlines of four planes: a count above 128 repeats the next byte, any other copies as
-    many bytes."""
+    """Decode run-length encoded scanlines of four planes.
+
+    A count above 128 repeats the next byte count - 128 times; any other count copies the next count bytes.
+    """
     lines = np.empty((height, 4 * width), np.uint8)
     start = bytes((2, 2, width >> 8, width & 255))
     at = 0

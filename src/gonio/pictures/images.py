@@ -1,8 +1,9 @@
-"""Pictures on disk: .exr, .hdr, .png and .npz, with the settings that made them, written completely or not at all.
+"""Read and write pictures: .exr, .hdr, .png and .npz files, with the settings with which they were rendered.
 
-A picture in memory is linear RGB, float32, shape (H, W, 3), row 0 on top. A PNG holds a screen's values: multiplied by
-2^exposure, clamped, sRGB-encoded, 8 bits. The settings are stored in EXR attributes, PNG text chunks, comment lines of
-the Radiance header, or an array named `metadata` in an .npz.
+Files are written completely or not at all. A picture in memory is linear RGB, float32, of shape (H, W, 3), with row 0
+on top. For a PNG file, values are multiplied by 2^exposure, clamped, sRGB-encoded and rounded to 8 bits. The settings
+are stored in EXR attributes, PNG text chunks, comment lines of the Radiance header, or an array named `metadata` in an
+.npz file.
 """
 
 from __future__ import annotations
@@ -41,7 +42,11 @@ _KINDS = {".exr": "OpenEXR", ".hdr": "RGBE", ".png": "PNG"}
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture read from `path`; `hdr` is False if the file holds a screen's values (.png)."""
+    """A picture read from a file.
+
+    path  the file
+    hdr   whether the file contains linear radiance; False for the sRGB-encoded values of a .png
+    """
 
     pixels: RGB
     path: Path
@@ -53,13 +58,16 @@ class Picture:
 
 
 def check_writable(path: str | Path) -> Path:
-    """The file to be written, with links followed. Raises InputError for an invalid path, before hours are spent."""
+    """The file to be written, with symbolic links resolved. Raises InputError if it cannot be written.
+
+    This is called before a render, so that no time is lost.
+    """
     _suffix(path)
     return files.check_file(path)
 
 
 def _suffix(path: str | Path) -> str:
-    """The suffix of a picture's file, in lower case. Raises InputError for an unknown one."""
+    """The suffix of a picture file in lower case. Raises InputError for an unknown suffix."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         hint = did_you_mean(suffix, SUFFIXES) if suffix else "add " + " or ".join(SUFFIXES)
@@ -69,10 +77,10 @@ def _suffix(path: str | Path) -> str:
 
 @exclusive
 def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
-    """Write a picture in the format of its suffix, completely or not at all. Returns the path that was written.
+    """Write a picture in the format of the file's suffix, completely or not at all. Returns the path of the file.
 
-    metadata  the settings that made the picture, stored in the file
-    exposure  stops; PNG only, since the other formats store radiance unchanged
+    metadata  the settings with which the picture was rendered, to be stored in the file
+    exposure  exposure in stops, for PNG only; the other formats store radiance unchanged
     Raises InputError for an invalid picture or file name. If the file cannot be written, raises InputError or
     MachineError, which names the file in which the picture was saved instead.
     """
@@ -82,11 +90,11 @@ def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, expos
     picture = np.ascontiguousarray(pixels, dtype=np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
         raise InputError(f"expected an RGB picture of shape (H, W, 3), got {picture.shape}", str(path))
-    # File names are bytes on some systems; no format can store those that are not valid text.
+    # On some systems, file names are arbitrary bytes; no format can store those that are not valid text.
     settings = {key: encodable(value) if isinstance(value, str) else value for key, value in (metadata or {}).items()}
     try:
         content = _encoded(suffix, picture, settings, exposure)
-    except Exception as error:  # whatever a library raises: the picture must not be lost
+    except Exception as error:  # of any type, because the picture must not be lost
         array = _npz_bytes(picture, {})
         rescued = files.keep_elsewhere(Path(path).with_suffix(".npz"), lambda file: file.write_bytes(array))
         hint = "nothing was written" if rescued is None else f"it is kept as {rescued}: `gonio convert` reads that"
@@ -105,8 +113,11 @@ def _encoded(suffix: str, picture: RGB, settings: Metadata, exposure: float) -> 
 
 
 class Shown(NamedTuple):
-    """The result of writing a picture: the exposure of a .png in stops, None for other formats, and a notice for the
-    user, or ""."""
+    """The result of writing a picture.
+
+    exposure  exposure of a .png in stops; None for other formats
+    notice    a notice for the user, or ""
+    """
 
     exposure: float | None
     notice: str
@@ -115,7 +126,7 @@ class Shown(NamedTuple):
 def write_exposed(
     path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: exposures.Exposure = 0.0
 ) -> Shown:
-    """Write a picture as `write` does, with an exposure that may be "auto"; a notice reports clipping."""
+    """Write a picture as `write` does. The exposure may be "auto"; a notice in the result reports clipping."""
     if Path(path).suffix.lower() != ".png":
         write(path, pixels, metadata)
         notice = f"{Path(path).suffix} stores radiance: --exposure applies to .png"
@@ -126,9 +137,10 @@ def write_exposed(
 
 
 def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure = 0.0) -> Shown:
-    """Write a picture, with its settings, in the format of the output's suffix; a .png at `exposure`, in stops.
+    """Convert a picture, with its settings, to the format of the output's suffix.
 
-    A .png as source is decoded from sRGB; clipped values stay clipped. Raises InputError as `read` and `write` do.
+    exposure  exposure of a .png output in stops
+    A .png source is decoded from sRGB; clipped values remain clipped. Raises the same errors as `read` and `write`.
     """
     check_writable(output)
     picture = read(source)
@@ -137,19 +149,22 @@ def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure
 
 
 def to_screen(pixels: RGB, exposure: float = 0.0) -> NDArray[np.uint8]:
-    """Convert linear radiance to 8-bit screen values: times 2^exposure, clamped, sRGB-encoded (IEC 61966-2-1)."""
+    """Convert linear radiance to 8-bit values: multiplied by 2^exposure, clamped and sRGB-encoded (IEC 61966-2-1)."""
     x = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0) * np.float32(2.0**exposure), 0, 1)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
     return (encoded * 255 + 0.5).astype(np.uint8)
 
 
 def from_screen(values: NDArray[np.floating]) -> RGB:
-    """Convert sRGB-encoded values in [0, 1] to linear ones; the inverse of `to_screen` at exposure 0."""
+    """Convert sRGB-encoded values in [0, 1] to linear values, the inverse of `to_screen` at exposure 0."""
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def png_bytes(values: NDArray[np.uint8] | NDArray[np.uint16], metadata: Metadata | None = None) -> bytes:
-    """An RGB PNG (ISO 15948) of (H, W, 3) values, with text chunks; 16 bits per channel if the values are uint16."""
+    """The bytes of an RGB PNG file (ISO 15948) with values (H, W, 3), and with the metadata in text chunks.
+
+    The file has 16 bits per channel if the values are uint16.
+    """
     height, width = values.shape[:2]
     bits = 8 * values.dtype.itemsize
     rows = np.frombuffer(values.astype(f">u{bits // 8}").tobytes(), np.uint8).reshape(height, -1)
@@ -169,7 +184,7 @@ def png_bytes(values: NDArray[np.uint8] | NDArray[np.uint16], metadata: Metadata
         [
             b"\x89PNG\r\n\x1a\n",
             chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)),
-            *([chunk(b"sRGB", b"\0")] if bits == 8 else []),  # 16-bit pictures hold values measured by a camera
+            *([chunk(b"sRGB", b"\0")] if bits == 8 else []),  # 16-bit pictures contain values measured by a camera
             *(text(_PREFIX + key, _one_line(value)) for key, value in (metadata or {}).items()),
             chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)),
             chunk(b"IEND", b""),
@@ -189,7 +204,7 @@ def _bitmap_bytes(picture: RGB, metadata: Metadata, file_format: str) -> bytes:
 
 
 def _half_a_step_up(picture: RGB) -> RGB:
-    """The picture plus half a step of RGBE, whose values Mitsuba truncates: they are then rounded. 0 stays 0."""
+    """Add half a quantization step of RGBE, so that Mitsuba, which truncates, rounds the values. 0 remains 0."""
     largest = picture.max(axis=2, keepdims=True)
     exponent = np.frexp(largest)[1]
     exponent = np.frexp(largest + np.ldexp(np.float32(0.5), exponent - 8))[1]  # rounding may reach the next power of 2
@@ -197,7 +212,7 @@ def _half_a_step_up(picture: RGB) -> RGB:
 
 
 def _with_comments(radiance: bytes, metadata: Metadata) -> bytes:
-    """A Radiance file with the settings as comment lines after its first line."""
+    """Insert the settings into a Radiance file, as comment lines after its first line."""
     rest = radiance.split(b"\n", 1)[1]  # Mitsuba writes "#?RGBE", which not every reader accepts
     lines = [f"# {_PREFIX}{key}={_one_line(value)}".encode() for key, value in metadata.items()]
     return b"\n".join([b"#?RADIANCE", *lines, rest])
@@ -223,12 +238,13 @@ ENCODINGS = ("srgb", "linear")
 
 @exclusive
 def read(path: str | Path, encoding: str = "srgb") -> Picture:
-    """A picture as linear RGB, with the settings that Gonio wrote into it.
+    """Read a picture as linear RGB, with the settings that Gonio has stored in it.
 
-    encoding  encoding of a .png: "srgb" for pictures, or "linear" for data such as a table, read as stored
-    An .npz holds `radiance` (or one array only). Gray pictures get three equal channels.
-    Raises InputError for a file that is missing, empty, damaged, of another format, or that claims more pixels than its
-    bytes can hold.
+    encoding  encoding of a .png: "srgb" for pictures, or "linear" for data such as tables, which are not decoded
+    An .npz file must contain an array named `radiance` or only a single array. Gray pictures are converted to three
+    equal channels.
+    Raises InputError for a file that is missing, empty, damaged, or of another format, and for a file whose header
+    states more pixels than the file can contain.
     """
     if encoding not in ENCODINGS:
         raise InputError(f"unknown encoding '{encoding}'", "--encoding", did_you_mean(encoding, ENCODINGS))
@@ -266,7 +282,7 @@ def _read_bitmap(source: Path, content: bytes, suffix: str, encoding: str) -> tu
         metadata = _metadata(content, suffix)
     except formats.Unreadable as error:
         raise InputError(f"this picture is damaged: {error}", location, "render or copy it again") from error
-    if suffix == ".png" and encoding == "srgb":  # decoded here, since a 16-bit PNG would be read as linear
+    if suffix == ".png" and encoding == "srgb":  # decoded here, because Mitsuba would read a 16-bit PNG as linear
         pixels = from_screen(_three_channels(values, location))
     else:
         pixels = _three_channels(values, location)
@@ -275,7 +291,7 @@ def _read_bitmap(source: Path, content: bytes, suffix: str, encoding: str) -> tu
 
 def _three_channels(values: NDArray[Number], path: str | Path) -> NDArray[Number]:
     pixels = values if values.ndim == 3 else values[..., None]
-    if pixels.shape[2] in (1, 2):  # luminance, with or without alpha
+    if pixels.shape[2] in (1, 2):  # gray, with or without alpha
         return np.repeat(pixels[..., :1], 3, axis=2)
     if pixels.shape[2] in (3, 4):
         return pixels[..., :3]
@@ -296,7 +312,7 @@ def _metadata(content: bytes, suffix: str) -> dict[str, Value]:
 
 
 def _exr_values(content: bytes) -> Iterator[tuple[str, Value]]:
-    """The strings and numbers among the attributes (OpenEXR's file layout, "Predefined attribute types")."""
+    """The strings and numbers among the attributes of an OpenEXR file (file layout, "Predefined attribute types")."""
     numbers = {"int": "<i", "float": "<f", "double": "<d"}
     for name, kind, value in openexr.attributes_of(content):
         if kind == "string":
@@ -315,7 +331,7 @@ def _png_texts(content: bytes) -> Iterator[tuple[str, Value]]:
 
 
 def _parsed(key: str, value: str) -> tuple[str, Value]:
-    """A metadata entry with its text converted to a number if possible."""
+    """A metadata entry, whose text is converted to a number if possible."""
     try:
         return key, int(value)
     except ValueError:

@@ -1,9 +1,9 @@
 """Differences between two pictures: RMSE, relMSE, mean ratio, and FLIP.
 
-All metrics take linear RGB pictures of shape (H, W, 3), row 0 on top: `test` first, `reference` second. FLIP predicts
-the differences that a person sees when flipping between the two: contrast sensitivity of the eye, color distance, edges
-and points, each as in [Andersson2020]; for pictures of high dynamic range, as in [Andersson2021], the largest value
-over the exposures at which the reference can be shown.
+All metrics take two linear RGB pictures of shape (H, W, 3), `test` and `reference`, with row 0 on top. FLIP predicts
+the differences that a person perceives when the two pictures alternate. It models the contrast sensitivity of the eye,
+color differences, edges and points, as in [Andersson2020]. For high-dynamic-range pictures, it is the maximum over the
+exposures at which the reference can be shown, as in [Andersson2021].
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ..errors import InputError, did_you_mean
 
 Floats = NDArray[np.floating]
 
-# The assumed display: a monitor with 3840 pixels in 0.7 m, viewed from 0.7 m [Andersson2020, section 6].
+# for a monitor with a width of 0.7 m and 3840 pixels, viewed from a distance of 0.7 m [Andersson2020, section 6]
 PIXELS_PER_DEGREE = 0.7 * (3840 / 0.7) * math.pi / 180
 
-# relMSE divides by r^2 plus this, so that a black reference pixel does not dominate the mean; it limits the weight of a
-# squared difference to 100.
+# This is added to r^2 in the denominator of relMSE, so that black pixels of the reference do not dominate the mean. It
+# limits the weight of a squared difference to 100.
 RELATIVE_FLOOR = 0.01
 
 
@@ -43,7 +43,7 @@ READ_AS = {
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The metric of a comparison and the largest value that passes; with None, any value passes."""
+    """The metric of a comparison, and the largest value that passes; None if any value passes."""
 
     metric: str = "relmse"
     most: float | None = None
@@ -57,8 +57,11 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The results of `gonio compare`; `exposures` are the first and last stop of HDR-FLIP, None for LDR; `encoding` is
-    how .png files were read, None if there were none."""
+    """The results of `gonio compare`.
+
+    exposures  first and last exposure of HDR-FLIP in stops; None for LDR-FLIP
+    encoding   encoding with which .png files were read; None if there were no such files
+    """
 
     rmse: float
     relmse: float
@@ -118,30 +121,34 @@ def _size(picture: Floats) -> str:
 
 
 def rmse(test: Floats, reference: Floats) -> float:
-    """sqrt(mean((x - r)^2)), over all pixels and channels."""
+    """The root-mean-square error sqrt(mean((x - r)^2)), over all pixels and channels."""
     a, b = _pair(test, reference)
     return float(np.sqrt(np.mean((a - b) ** 2)))
 
 
 def relmse_map(test: Floats, reference: Floats) -> Floats:
-    """(x - r)^2 / (r^2 + 0.01), averaged over the channels: (H, W)."""
+    """The squared relative error per pixel, (x - r)^2 / (r^2 + 0.01), averaged over the channels, (H, W)."""
     a, b = _pair(test, reference)
     return ((a - b) ** 2 / (b**2 + RELATIVE_FLOOR)).mean(axis=2)
 
 
 def relmse(test: Floats, reference: Floats) -> float:
-    """mean((x - r)^2 / (r^2 + 0.01)): the squared relative error, bounded for dark pixels."""
+    """The mean squared relative error, mean((x - r)^2 / (r^2 + 0.01)), which is bounded for dark pixels."""
     return float(relmse_map(test, reference).mean())
 
 
 def mean_ratio(test: Floats, reference: Floats) -> float:
-    """mean(x) / mean(r): 1 if energy is conserved; NaN if the reference is black."""
+    """The ratio of the means, mean(x) / mean(r), which is 1 if energy is conserved; NaN if the reference is black."""
     a, b = _pair(test, reference)
     return float(a.mean() / b.mean()) if b.mean() != 0 else (1.0 if a.mean() == 0 else math.nan)
 
 
 def compare(test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolerance = Tolerance()) -> Comparison:
-    """All metrics; with `hdr` False, FLIP compares the pictures as shown on a screen, clamped to [0, 1]."""
+    """Compute all metrics.
+
+    hdr        whether FLIP is HDR-FLIP; if False, the pictures are clamped to [0, 1], as on a screen
+    tolerance  the metric and value that decide whether the comparison passes
+    """
     _pair(test, reference)
     exposures = exposure_range(reference) if hdr else None
     return Comparison(
@@ -155,9 +162,9 @@ def compare(test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolera
 
 
 # --- FLIP ------------------------------------------------------------------------------------------------
-# NVIDIA's wheel `flip-evaluator` is not used, since version 1.7 supports neither Python 3.14 nor Linux on ARM. The two
-# agree: for the 16 pictures of examples/, with 20 % noise, the means differ by at most 7e-6 and pixels by 4e-5 (the
-# wheel computes in float32).
+# NVIDIA's package `flip-evaluator` is not used, because version 1.7 supports neither Python 3.14 nor Linux on ARM. Its
+# results agree with those of this module: for the 16 pictures of examples/, with 20 % noise, the means differ by at
+# most 7e-6, and single pixels by at most 4e-5 (the package computes in float32).
 
 _XYZ_FROM_RGB = np.array(  # linear sRGB to CIE XYZ with the D65 white of [Andersson2020]
     [
@@ -169,13 +176,13 @@ _XYZ_FROM_RGB = np.array(  # linear sRGB to CIE XYZ with the D65 white of [Ander
 _RGB_FROM_XYZ = np.linalg.inv(_XYZ_FROM_RGB)
 _WHITE = _XYZ_FROM_RGB.sum(axis=1)
 
-_HYAB_POWER = 0.7  # q_c, [Andersson2020, section 4.1.3]: compresses large color distances
-_KNEE_IN, _KNEE_OUT = 0.4, 0.95  # p_c, p_t: 40 % of the largest distance maps to 0.95
-_FEATURE_WIDTH = 0.082  # w, degrees: the width of an edge or point that the eye detects
+_HYAB_POWER = 0.7  # q_c, [Andersson2020, section 4.1.3], which compresses large color distances
+_KNEE_IN, _KNEE_OUT = 0.4, 0.95  # p_c, p_t: 40 % of the largest distance is mapped to 0.95
+_FEATURE_WIDTH = 0.082  # w, the width of an edge or point that the eye detects, degrees
 _FEATURE_POWER = 0.5  # q_f
 
-# Contrast sensitivity as sums of Gaussians, (a1, b1, a2, b2): [Andersson2020, table 1]; achromatic,
-# red-green, blue-yellow.
+# Contrast sensitivity as sums of Gaussians, (a1, b1, a2, b2), for the achromatic, red-green and blue-yellow channels
+# [Andersson2020, table 1]
 _SENSITIVITY = (
     (1.0, 0.0047, 0.0, 1e-5),
     (1.0, 0.0053, 0.0, 1e-5),
@@ -184,18 +191,18 @@ _SENSITIVITY = (
 
 
 def flip_map(test: Floats, reference: Floats, hdr: bool = True, pixels_per_degree: float = PIXELS_PER_DEGREE) -> Floats:
-    """FLIP per pixel, (H, W), 0 to 1.
+    """The FLIP error of each pixel, (H, W), from 0 to 1.
 
-    With `hdr` False, the pictures are clamped to [0, 1] and compared as a screen shows them. With `hdr` True, they are
-    tone mapped (ACES) at several exposures, and every pixel gets its largest value [Andersson2021, eq. 6]; the
-    exposures depend on the reference alone (see `exposure_range`).
-    HDR-FLIP is not symmetric: swapping the pictures changes the exposures.
+    If `hdr` is False, the pictures are clamped to [0, 1] and compared as a screen would show them. If it is True, they
+    are tone mapped (ACES) at several exposures, and the maximum over the exposures is used for each pixel
+    [Andersson2021, eq. 6]. The exposures depend only on the reference (see `exposure_range`), so HDR-FLIP is not
+    symmetric: swapping the pictures changes the exposures.
     """
     a, b = _pair(test, reference)
     if not hdr:
         return _ldr_flip(np.clip(a, 0, 1), np.clip(b, 0, 1), pixels_per_degree)
     start, stop = exposure_range(b)
-    count = max(2, math.ceil(stop - start))  # one per stop [Andersson2021, section 3.2]
+    count = max(2, math.ceil(stop - start))  # one exposure per stop [Andersson2021, section 3.2]
     worst = np.zeros(a.shape[:2])
     for exposure in np.linspace(start, stop, count):
         test_shown, reference_shown = (_aces(np.maximum(x, 0) * 2.0**exposure) for x in (a, b))
@@ -212,15 +219,18 @@ def _aces(x: Floats) -> Floats:
 
 
 def exposure_range(reference: Floats) -> tuple[float, float]:
-    """First and last exposure in stops (powers of two), at which ACES maps the reference's brightest pixel and its
-    median to 0.85 [Andersson2021, section 3.2]."""
+    """The first and last exposure of HDR-FLIP in stops.
+
+    At these exposures, ACES maps the brightest pixel and the median of the reference to 0.85 [Andersson2021, section
+    3.2].
+    """
     k0, k1, k2, k3, k4, k5 = _ACES
     a, b, c = k0 - 0.85 * k3, k1 - 0.85 * k4, k2 - 0.85 * k5
     x_max = -b / (2 * a) + math.sqrt((b / (2 * a)) ** 2 - c / a)  # solves _aces(x) = 0.85
     luminance = np.maximum(np.asarray(reference, np.float64), 0) @ _XYZ_FROM_RGB[1]
     if luminance.max() <= 0:
         return 0.0, 0.0  # a black reference is compared at exposure 0
-    # A black median would need infinitely many stops; 2^-23 of the peak is at the limit of float32's resolution.
+    # A black median would require infinitely many stops; 2^-23 of the peak is the limit of float32 resolution.
     median = max(float(np.median(luminance)), float(luminance.max()) * 2.0**-23)
     return math.log2(x_max / luminance.max()), math.log2(x_max / median)
 
@@ -234,7 +244,7 @@ def _ldr_flip(test: Floats, reference: Floats, pixels_per_degree: float) -> Floa
 
 
 def _opponent(rgb: Floats) -> Floats:
-    """Linear RGB to YyCxCz, a linear counterpart of L*a*b* in which the eye's filter is applied."""
+    """Convert linear RGB to YyCxCz, a linear variant of L*a*b* in which the contrast filters are applied."""
     x, y, z = np.moveaxis(rgb @ _XYZ_FROM_RGB.T / _WHITE, -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
@@ -246,7 +256,10 @@ def _from_opponent(ycc: Floats) -> Floats:
 
 
 def _hunt_lab(rgb: Floats) -> Floats:
-    """L*a*b* with the Hunt adjustment: a and b are multiplied by 0.01 L, as brighter colors appear more saturated."""
+    """Convert to L*a*b* with the Hunt adjustment.
+
+    a and b are multiplied by 0.01 L, because brighter colors appear more saturated.
+    """
     t = rgb @ _XYZ_FROM_RGB.T / _WHITE
     delta = 6 / 29
     x, y, z = np.moveaxis(np.where(t > delta**3, np.cbrt(t), t / (3 * delta**2) + 4 / 29), -1, 0)
@@ -255,7 +268,10 @@ def _hunt_lab(rgb: Floats) -> Floats:
 
 
 def _hyab(a: Floats, b: Floats) -> Floats:
-    """City-block distance in lightness, Euclidean in chroma: better than either for large differences."""
+    """The HyAB color distance: city-block distance in lightness plus Euclidean distance in chroma.
+
+    For large differences, it is more accurate than either distance alone.
+    """
     difference = a - b
     return np.abs(difference[..., 0]) + np.hypot(difference[..., 1], difference[..., 2])
 
@@ -268,7 +284,7 @@ def _color_distance(test: Floats, reference: Floats, pixels_per_degree: float) -
         return _hunt_lab(np.clip(_from_opponent(filtered), 0, 1))
 
     power = _hyab(perceived(test), perceived(reference)) ** _HYAB_POWER
-    green, blue = _hunt_lab(np.eye(3)[1]), _hunt_lab(np.eye(3)[2])  # the farthest pair of the sRGB cube
+    green, blue = _hunt_lab(np.eye(3)[1]), _hunt_lab(np.eye(3)[2])  # the most distant pair in the sRGB cube
     largest = float(_hyab(green, blue)) ** _HYAB_POWER
     knee = _KNEE_IN * largest
     return np.where(
@@ -277,7 +293,7 @@ def _color_distance(test: Floats, reference: Floats, pixels_per_degree: float) -
 
 
 def _contrast_filter(channel: Floats, a1: float, b1: float, a2: float, b2: float, pixels_per_degree: float) -> Floats:
-    """A channel blurred as by the eye, with a normalized sum of two separable Gaussians."""
+    """Filter a channel by the contrast sensitivity of the eye, a normalized sum of two separable Gaussians."""
     widest = max(b for row in _SENSITIVITY for b in (row[1], row[3]))
     radius = math.ceil(3 * math.sqrt(widest / (2 * math.pi**2)) * pixels_per_degree)
     x = np.arange(-radius, radius + 1) / pixels_per_degree
@@ -301,7 +317,7 @@ def _feature_distance(test: Floats, reference: Floats, pixels_per_degree: float)
     edge, point = -x * gauss, (x * x / sigma**2 - 1) * gauss
 
     def strength(luminance: Floats, detector: Floats) -> Floats:
-        # Positive and negative weights each sum to one, as in the two-dimensional filter.
+        # The positive weights and the negative weights each sum to one, as in the two-dimensional filter.
         across = gauss / gauss.sum()
         along = np.where(detector < 0, detector / -detector[detector < 0].sum(), 0)
         along = along + np.where(detector > 0, detector / detector[detector > 0].sum(), 0)
@@ -314,7 +330,7 @@ def _feature_distance(test: Floats, reference: Floats, pixels_per_degree: float)
 def _filtered(channel: Floats, down: Floats, right: Floats) -> Floats:
     """Correlate with the outer product of a column filter and a row filter; border pixels are repeated outward.
 
-    Correlation and convolution differ by a reflection; only the edge detector is odd, and only its absolute value
-    is used.
+    Correlation and convolution differ by a reflection. This does not matter, because only the edge detector is odd, and
+    only its absolute value is used.
     """
     return correlate1d(correlate1d(channel, down, 0, mode="nearest"), right, 1, mode="nearest")

@@ -1,7 +1,7 @@
-"""The layout of untrusted OpenEXR files: header, table of offsets, and blocks ("OpenEXR File Layout", openexr.com).
+"""Check the layout of untrusted OpenEXR files: header, offset table and blocks ("OpenEXR File Layout", openexr.com).
 
-The library allocates the sizes that a file states before it has read the data, so all of them are compared with the
-file's length.
+The OpenEXR library allocates the sizes that a file states before it reads the data. All sizes are therefore compared to
+the length of the file.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ MAX_CHANNELS = 1024  # some files have one channel per object
 
 
 class Unreadable(ValueError):
-    """A picture is damaged or contradicts itself; the message gives the reason."""
+    """Raised if a picture is damaged or inconsistent; the message states the reason."""
 
 
 class Claimed(NamedTuple):
-    """The claims of a header: size in pixels, and the smallest number of uncompressed bits per pixel."""
+    """The data that a header states: the size in pixels, and the smallest number of uncompressed bits per pixel."""
 
     width: int
     height: int
     bits: int
 
 
-_HALF_FLOAT = (32, 16, 32)  # bits of UINT, HALF and FLOAT
+_HALF_FLOAT = (32, 16, 32)  # numbers of bits of UINT, HALF and FLOAT
 
 
 def claimed(content: bytes) -> Claimed:
-    """The size that a file claims. Raises Unreadable for a header that contradicts itself."""
+    """The size stated in the header of a file. Raises Unreadable if the header is inconsistent."""
     attributes = {name: value for name, _, value in attributes_of(content)}
     try:
         width, height = _window(attributes)
@@ -57,8 +57,8 @@ def claimed(content: bytes) -> Claimed:
     return Claimed(width, height, bits)
 
 
-# Sizes of attribute types in bytes (OpenEXR, "File layout"). The library reads that many, whatever size the file
-# states, and would then interpret misaligned data as names and sizes of blocks to allocate.
+# Sizes of attribute types in bytes (OpenEXR, "File layout"). The library reads this number of bytes, regardless of the
+# size that the file states, and would then interpret misaligned data as names and as sizes of blocks to allocate.
 _EXR_BYTES = {
     kind: size
     for size, kinds in {
@@ -81,7 +81,10 @@ _EXR_BYTES = {
 
 
 def attributes_of(content: bytes) -> Iterator[tuple[str, str, bytes]]:
-    """Name, type and value of each attribute in the (first) header of an OpenEXR file. Raises Unreadable."""
+    """The name, type and value of each attribute in the first header of an OpenEXR file.
+
+    Raises Unreadable if the header is damaged.
+    """
     version = _version(content)
     if version & ~0x1EFF:
         raise Unreadable(f"it is of an unknown version of OpenEXR, {version:#x}")
@@ -99,7 +102,7 @@ def _version(content: bytes) -> int:
 
 
 def _header(content: bytes, at: int) -> Iterator[tuple[str, str, bytes, int]]:
-    """Name, type and value of each attribute from `at` on, and the position of the next."""
+    """The name, type and value of each attribute of the header at `at`, and the position of the next attribute."""
     while content[at]:
         texts = []
         for _ in range(2):  # name and type
@@ -122,12 +125,12 @@ def _header(content: bytes, at: int) -> Iterator[tuple[str, str, bytes, int]]:
 
 # ---------------------------------------------------------------------- blocks
 
-_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)  # lines in a block, by compression
-MIN_BLOCK = 1 << 19  # pixels that a block may have whatever the picture's size; the library holds a dozen blocks
+_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)  # number of lines in a block, by compression
+MIN_BLOCK = 1 << 19  # pixels that a block may have in a picture of any size; the library holds a dozen blocks
 
 
 def check_blocks(content: bytes) -> None:
-    """Raise Unreadable if a table of offsets, or the size that a block states, exceeds the file."""
+    """Raise Unreadable if an offset table, or a block of the stated size, extends beyond the end of the file."""
     version, at = _version(content), 8
     several = bool(version & 0x1000)
     parts: list[dict[str, bytes]] = []  # attributes of each part
@@ -141,7 +144,7 @@ def check_blocks(content: bytes) -> None:
         count = _tiles(attributes) if tiled else _line_blocks(attributes)
         if count > (len(content) - at) // 8:
             raise Unreadable("it is truncated in its table of blocks")
-        before = (4 if several else 0) + (16 if tiled else 4)  # the part and the place of a block
+        before = (4 if several else 0) + (16 if tiled else 4)  # bytes of the part number and the position of a block
         offsets = struct.unpack(f"<{count}Q", content[at : at + 8 * count])
         at += 8 * count
         for offset in offsets:
@@ -183,9 +186,9 @@ def _tiles(attributes: dict[str, bytes]) -> int:
 
     if kind == 0:
         pairs = [(width, height)]
-    elif kind == 1:  # a pyramid
+    elif kind == 1:  # mipmap levels
         both = levels(max(width, height))
         pairs = list(zip(sides(width, both), sides(height, both), strict=True))
-    else:  # every vertical level with every horizontal level
+    else:  # ripmap levels: every combination of a horizontal and a vertical level
         pairs = list(product(sides(width, levels(width)), sides(height, levels(height))))
     return sum(-(-w // across) * -(-h // along) for w, h in pairs)

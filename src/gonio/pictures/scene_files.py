@@ -1,4 +1,4 @@
-"""Checks of the files that a Mitsuba scene refers to: pictures, meshes and volumes that Mitsuba opens itself."""
+"""Check the files to which a Mitsuba scene refers: pictures, meshes and volumes, which Mitsuba opens itself."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy as np
 
 from .formats import Unreadable, check, decode, kind_of, mitsuba_path
 
-MAX_BYTES = 1 << 30  # of a file
+MAX_BYTES = 1 << 30  # maximum size of a file
 
 
 def check_file(path: Path) -> None:
-    """Raise Unreadable for a damaged file of a known kind that Mitsuba will open itself."""
+    """Raise Unreadable if a file of a known kind, which Mitsuba will open, is damaged."""
     if path.stat().st_size > MAX_BYTES:
         raise Unreadable(f"it is larger than {MAX_BYTES >> 20} MiB")
     mitsuba_path(path)
@@ -43,7 +43,7 @@ def _fits(content: bytes, at: int, needed: int) -> None:
 
 
 def _plain_text(content: bytes) -> None:
-    """PPM and PFM: a header in text, then the values."""
+    """Check a PPM or PFM file: a text header, then the values."""
     header = re.match(rb"P([6Ff])\s(\d{1,6})\s(\d{1,6})\s([-+.\d]{1,20})\s", content)
     if header is None:
         raise Unreadable("its header is damaged")
@@ -71,7 +71,7 @@ def _tga(content: bytes) -> None:
     _fits(content, 18 + text, width * height * depth // 8)
 
 
-# Flags of a serialized mesh: numbers per vertex for each optional attribute, and whether numbers have 64 bits
+# flags of a serialized mesh: the number of values per vertex of each optional attribute, and double precision
 _ATTRIBUTES = {0x1: 3, 0x2: 2, 0x8: 3}
 _DOUBLE = 0x2000
 _MAX_NAME = 1 << 16
@@ -79,7 +79,11 @@ _CHUNK = 1 << 20
 
 
 def _serialized(content: bytes) -> None:
-    """Mitsuba's serialized meshes: an uncompressed header and a zlib stream each, with their offsets at the end."""
+    """Check a file of Mitsuba's serialized meshes.
+
+    Each mesh consists of an uncompressed header and a zlib stream; the offsets of the meshes are at the end of the
+    file.
+    """
     version = struct.unpack_from("<H", content, 2)[0]
     if version not in (3, 4):
         raise Unreadable(f"it is of version {version}, 3 or 4 expected")
@@ -118,7 +122,7 @@ def _serialized_mesh(packed: bytes, named: bool) -> None:
 
 
 class _Inflated:
-    """A zlib stream that is decompressed piece by piece, so that no memory is allocated for false claims."""
+    """A zlib stream that is decompressed in pieces, so that no memory is allocated for wrongly stated sizes."""
 
     def __init__(self, packed: bytes) -> None:
         self.zlib, self.packed, self.ready = zlib.decompressobj(), packed, b""
@@ -142,14 +146,14 @@ class _Inflated:
 
 
 def _volume(content: bytes) -> None:
-    """A grid of float32 values."""
+    """Check a volume: a grid of float32 values."""
     version, kind, x, y, z, channels = struct.unpack_from("<Biiiii", content, 3)
     if version != 3 or kind != 1 or min(x, y, z) <= 0 or channels not in (1, 3, 6):
         raise Unreadable("it is not a grid of 32-bit values with 1, 3 or 6 channels")
     _fits(content, 48, 4 * x * y * z * channels)
 
 
-# (whether a file is of that format, the check of its content)
+# pairs (whether a file has this format, the check of its content)
 _PLAIN: tuple[tuple[Callable[[Path, bytes], bool], Callable[[bytes], None]], ...] = (
     (lambda path, content: content[:2] in (b"P6", b"PF", b"Pf"), _plain_text),
     (lambda path, content: content[:2] == b"BM", _bmp),

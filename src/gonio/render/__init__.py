@@ -1,4 +1,4 @@
-"""From scene to picture: prepare a render, run it, write checkpoints and image files."""
+"""Render scenes: prepare a render, run it, and write checkpoints and picture files."""
 
 from __future__ import annotations
 
@@ -35,33 +35,36 @@ def render(
         picture = go.render("gold.json")        # the result of a fit, on a ball
         picture, slope = go.render("examples/conductor-ggx", gradient=["shapes.0.material.alpha"])
 
-    scene          a scene's folder or .json, a Mitsuba .xml, or a material, as `go.material` takes it, which is shown
-                   on a ball; an option below that is None has the scene's value
-    output         file to write: .exr, .hdr, .png or .npz; None writes nothing
+    scene          a folder or .json file of a scene, a Mitsuba .xml file, or a material, as for `go.material`, which is
+                   shown on a ball. Options below that are None have the values in the scene
+    output         file to write: .exr, .hdr, .png or .npz; None writes no file
     spp            samples per pixel
     size           width and height of the film, pixels
     integrator     "direct", "path", "caustics", "light", "whitted", "normal", ...
     max_depth      maximum path length in segments, for the integrators "path", "caustics" and "light"
     sampler        source of the random numbers, such as "sobol"
-    seed           seed of the random numbers; the same seed gives a bit-identical picture
+    seed           seed of the random numbers; equal seeds give bit-identical pictures
     device         "cpu", "cuda" or "auto"
-    spectral       trace wavelengths instead of red, green and blue: glass disperses, and lamps have their spectra
-    threads        CPU cores to use; None uses all
-    timeout        seconds after which the render stops and returns the picture so far
-    denoise        denoise the result with Open Image Denoise
-    exposure       brightness of a .png in stops; "auto" chooses it from the picture's luminance
-    allow_outside  allow the scene to read files outside its folder
-    allow_code     allow the scene to run materials in Python files, "ward.py:Ward", and native Mitsuba plugins in its
-                   folder `plugins`
+    spectral       whether to trace wavelengths instead of red, green and blue, so that glass disperses light and lamps
+                   have their spectra
+    threads        number of CPU cores to use; None uses all
+    timeout        time in seconds after which the render stops and the unfinished picture is returned
+    denoise        whether to denoise the picture with Open Image Denoise
+    exposure       exposure of a .png file in stops; "auto" derives it from the luminance of the picture
+    allow_outside  whether the scene may read files outside its folder
+    allow_code     whether the scene may run materials in Python files, such as "ward.py:Ward", and native Mitsuba
+                   plugins in its folder `plugins`
     overrides      values by their paths in the scene, as in `gonio study`; a value may be a material
-    checkpoint     file for the sums so far, written every few seconds; if it exists, the render continues from it, with
-                   bit-identical results. None writes one next to the output if the render takes more than a minute
-    until_error    render until the estimated relMSE of the picture is below this value, using at most `spp` samples per
-                   pixel (65,536 if None); warns if these do not suffice
-    gradient       paths of numbers and colors of materials ("....albedo.r" is one channel); the result is the picture
-                   and its derivatives, (1 + paths, height, width, 3). Equal materials are differentiated together
-    Warns (GonioWarning) about suspicious scenes, about a .png that clips, and when it continues from a checkpoint.
-    Raises InputError for an invalid scene or option, MachineError if this machine cannot render it.
+    checkpoint     file to which the accumulated samples are written every few seconds. If it exists, the render
+                   continues from it, with bit-identical results. If None, a render of more than a minute writes a
+                   checkpoint next to the output
+    until_error    render until the estimated relMSE of the picture is below this value, with at most `spp` samples per
+                   pixel (65,536 if None); a warning is issued if these do not suffice
+    gradient       paths of numbers and colors of materials ("....albedo.r" is one channel), with respect to which the
+                   picture is differentiated. The result then contains the picture and its derivatives,
+                   (1 + paths, height, width, 3). Equal materials are differentiated together
+    Warns (GonioWarning) about suspicious scenes, about clipping in a .png, and if the render continues from a
+    checkpoint. Raises InputError for an invalid scene or option, MachineError if this machine cannot render it.
     """
     from .request import Request
 
@@ -85,7 +88,7 @@ def _path(named: str | Path | None) -> Path | None:
 
 
 def _shown(scene: MaterialLike, allow_code: bool) -> tuple[Path, BSDF | None]:
-    """(path of a scene, None), or (name of a material, the material), which may be given as a string."""
+    """The path of a scene and None, or the name of a material and the material. The argument may be a string."""
     from ..catalog import notation, operands
     from ..catalog.material import material
 
@@ -109,17 +112,17 @@ def resume(
     timeout: float | None = None,
     allow_code: bool = False,
 ) -> RGB:
-    """Continue a render from its checkpoint; the picture is bit-identical to that of an uninterrupted `go.render`.
+    """Continue a render from its checkpoint. The picture is bit-identical to that of an uninterrupted `go.render`.
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write. None writes to the output of the original request, if it named one, provided that this
-                file is in the checkpoint's folder; otherwise to a file of that name next to the checkpoint, with a
+    output      file to write. None writes the output of the original request, if it named one. If this file is not in
+                the folder of the checkpoint, a file of the same name next to the checkpoint is written instead, with a
                 warning
-    spp         samples per pixel in total; None uses the number of the original request
-    threads     CPU cores to use; None uses all
-    timeout     seconds after which the render stops and returns the picture so far
-    allow_code  allow the scene to run the Python files that it names
+    spp         total number of samples per pixel; None uses the number in the original request
+    threads     number of CPU cores to use; None uses all
+    timeout     time in seconds after which the render stops and the unfinished picture is returned
+    allow_code  whether the scene may run the Python files that it names
     Raises InputError if the checkpoint is damaged or if anything that the picture depends on has changed.
     """
     from . import checkpoints
@@ -138,7 +141,7 @@ def resume(
 
 
 def _picture(request: Request, level: int, notice: str = "") -> RGB:
-    """Render the picture, write it if an output is named, and issue all warnings at the caller `level` frames up."""
+    """Render the picture, write it if the request names an output, and issue warnings at stack level `level`."""
     import warnings
 
     from ..bridge import engine

@@ -1,9 +1,9 @@
-"""The speed of this machine: rays, a material and two integrators, compared with Mitsuba's own in the same process.
+"""Measure the speed of ray tracing, of a material and of two integrators on this machine, and compare it to Mitsuba's.
 
     gonio doctor --bench
 
-The two are timed alternately, so that other load affects them equally. The result is the best of several rounds after
-compilation.
+Gonio and Mitsuba run alternately in the same process, so that other load affects both equally. The result is the best
+of several rounds after compilation.
 """
 
 from __future__ import annotations
@@ -16,15 +16,18 @@ from types import ModuleType
 from ..bridge import engine
 from ..bridge.types import BSDFPlugin, PluginDict, Scene
 
-LANES = {"llvm": 1 << 20, "cuda": 1 << 25}  # a GPU would finish a million before Python launches the next kernel
+LANES = {"llvm": 1 << 20, "cuda": 1 << 25}  # a GPU would finish a million lanes before Python launches the next kernel
 SIZE, SPP = {"llvm": 256, "cuda": 1024}, 16
 ROUNDS = 5
-_ETA, _K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]  # gold at three wavelengths, as in benchmarks
+_ETA, _K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]  # gold at three wavelengths, as in `benchmarks`
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table: millions per second of Gonio and of Mitsuba; `gonio` is 0 if only Mitsuba has the task."""
+    """A row of the table: a task, and its speed in millions per second in Gonio and in Mitsuba.
+
+    `gonio` is 0 if the task exists only in Mitsuba.
+    """
 
     what: str
     gonio: float
@@ -35,9 +38,10 @@ class Row:
 
 
 def measure(device: str = "cpu") -> tuple[str, list[Row]]:
-    """A description of the machine, and the table. Raises MachineError if the device is missing.
+    """Measure the speed. Returns a description of the machine, and the table.
 
     device  "cpu", "cuda" or "auto"
+    Raises MachineError if the device is missing.
     """
     mi = engine.load(device)
     lanes, size = (by_kind[mi.variant()[:4]] for by_kind in (LANES, SIZE))
@@ -87,7 +91,7 @@ def measure(device: str = "cpu") -> tuple[str, list[Row]]:
 
 
 def _best(dr: ModuleType, count: int, *tasks: Callable[[], None]) -> list[float]:
-    """Millions per second of each task; tasks are timed in turn."""
+    """The speed of each task in millions per second; the tasks are timed alternately."""
     least = [float("inf")] * len(tasks)
     for task in tasks:  # compile
         task()
@@ -102,7 +106,7 @@ def _best(dr: ModuleType, count: int, *tasks: Callable[[], None]) -> list[float]
 
 
 def _scene(mi: ModuleType, bsdf: str, size: int) -> Scene:
-    """A gold ball on a gray floor under a square lamp."""
+    """A scene with a gold ball on a gray floor under a square lamp."""
     to = mi.ScalarTransform4f
     gold: PluginDict = {"type": bsdf, "alpha": 0.2}
     gold |= {name: {"type": "rgb", "value": value} for name, value in (("eta", _ETA), ("k", _K))}

@@ -1,9 +1,9 @@
-"""Checkpoints of a render: the sums so far, and hashes of everything else that the picture depends on.
+"""Checkpoints of a render: the accumulated samples, and hashes of everything else on which the picture depends.
 
-A render that continues from a checkpoint is bit-identical to an uninterrupted one, since samples are summed in the same
-order. This holds only if nothing else has changed. The file therefore contains hashes of the scene, of every file that
-it names, of the settings and of Gonio's own code, and the name of the processor or GPU; an error names whatever has
-changed.
+A render that continues from a checkpoint is bit-identical to an uninterrupted one, because samples are summed in the
+same order. This requires that nothing else has changed. The file therefore contains hashes of the scene, of every file
+that the scene names, of the settings and of Gonio's own code, and the name of the processor or GPU. If one of these has
+changed, an error names it.
 """
 
 from __future__ import annotations
@@ -30,15 +30,17 @@ from .request import MAX_COUNT, Request
 from .request_json import STRICT, described, request_of, validated
 
 INTERVAL = 3.0  # seconds between checkpoints; including a pass and the writing, less than 5 s of work can be lost
-MAX_COST = 0.015  # fraction of the time; if writing costs more, checkpoints are written less often
+MAX_COST = 0.015  # maximum fraction of the time for writing; if it takes longer, checkpoints are written less often
 LONG_JOB = 60.0  # seconds that a job must be expected to take before an automatic checkpoint is written
 SUFFIX = ".checkpoint"  # suffix of an automatic checkpoint, appended to the picture's name
 KIND = "render"
 
 
 def load(path: Path) -> kept.Kept:
-    """The checkpoint in a file, or the previous one if that is damaged. Raises InputError if there is none, or if it is
-    not a checkpoint of a render."""
+    """Read a checkpoint, or the previous one if the file is damaged.
+
+    Raises InputError if there is no checkpoint, or if the file is not a checkpoint of a render.
+    """
     saved = kept.read(path)
     if saved.facts.get("kind") != KIND:
         raise InputError("this is not a checkpoint of a render", str(path), "give one that `gonio render` has written")
@@ -47,7 +49,7 @@ def load(path: Path) -> kept.Kept:
 
 
 class _Facts(BaseModel):
-    """The facts of a checkpoint, stored with its sums."""
+    """The facts that a checkpoint contains in addition to the accumulated samples."""
 
     model_config = STRICT
     kind: str
@@ -61,7 +63,10 @@ class _Facts(BaseModel):
 
 
 def restore(render: Renders, saved: kept.Kept, where: str) -> None:
-    """Copy the sums of a checkpoint into a render. Raises InputError, which names `where`, if they do not fit it."""
+    """Copy the accumulated samples of a checkpoint into a render.
+
+    Raises InputError, which names `where`, if they do not match the render.
+    """
     try:
         render.restore(int(saved.facts["done"]), saved.arrays)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -71,11 +76,11 @@ def restore(render: Renders, saved: kept.Kept, where: str) -> None:
 class Keeper:
     """Writes checkpoints during a render, in a separate thread.
 
-    path       the file; None writes nothing
-    prepared   the prepared render whose accumulated sample sums are written
-    temporary  whether the checkpoint is automatic: written only once the job is expected to take more than `LONG_JOB`
-               seconds, and removed after the picture has been written
-    long       seconds to use instead of `LONG_JOB`
+    path       the file; None writes no checkpoints
+    prepared   the render whose accumulated samples are written
+    temporary  whether the checkpoint is automatic: it is written only if the job is expected to take more than
+               `LONG_JOB` seconds, and removed after the picture has been written
+    long       duration in seconds to use instead of `LONG_JOB`
     """
 
     def __init__(
@@ -95,7 +100,7 @@ class Keeper:
         self._thread: threading.Thread | None = None
         self._held: Arrays | None = None  # keeps the arrays alive while the thread reads them
         self._identity: dict[str, str] = {}
-        self._cost = 0.0  # seconds of rendering time that the last checkpoint cost
+        self._cost = 0.0  # seconds by which the last checkpoint delayed the render
         self._request = None if path is None else self._describe()
 
     def _describe(self) -> Facts | None:
@@ -112,7 +117,7 @@ class Keeper:
         return self._temporary and not self.written and now - self._began + self._remaining < self._long
 
     def after_pass(self, progress: Progress) -> None:
-        """Write a checkpoint if one is due."""
+        """Write a checkpoint if enough time has passed since the last one."""
         now, self._remaining = self._clock(), progress.remaining
         if self._thread is not None and not self._thread.is_alive():
             self.close()
@@ -124,7 +129,7 @@ class Keeper:
         self._begin()
 
     def end(self, stopped: bool) -> None:
-        """Write a last checkpoint, so that the render can be continued later, or to more samples."""
+        """Write a last checkpoint, so that the render can be continued later or with more samples."""
         self.close()
         if self.path is not None and (stopped or not self._temporary) and not self._short(self._clock()):
             self._begin()
@@ -155,7 +160,7 @@ class Keeper:
             "request": self._request,
             "temporary": self._temporary,
         }
-        garbage.pause()  # until the thread has ended, see `gonio.garbage`
+        garbage.pause()  # until the thread ends, see `gonio.garbage`
         self._thread = threading.Thread(target=self._write, args=(about, self._held, self._clock() - started))
         self._thread.start()
 
@@ -181,11 +186,11 @@ def default_path(output: Path) -> Path:
 
 
 def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]:
-    """Continue from a checkpoint that an earlier run of the same render left.
+    """Continue from the checkpoint of an earlier run of the same render.
 
-    Returns a notice for the user, "" if there is none, and whether the checkpoint is automatic.
+    Returns a notice for the user, or "", and whether the checkpoint is automatic.
 
-    temporary  whether no checkpoint was requested; one that does not fit is then removed, with a notice
+    temporary  whether no checkpoint was requested; a checkpoint that does not match is then removed, with a notice
     """
     if not kept.exists(path):
         return "", temporary
@@ -194,7 +199,7 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
         check(saved.facts, prepared.sources.identity(), str(path))
         done = int(saved.facts["done"])
         if done > prepared.spp:
-            what = f"the checkpoint holds {done} samples per pixel, but {prepared.spp} are requested"
+            what = f"the checkpoint has {done} samples per pixel, but {prepared.spp} are requested"
             raise InputError(what, str(path), f"give --spp {done} or more, or another --checkpoint")
         restore(prepared.render, saved, str(path))
     except InputError as error:
@@ -210,12 +215,12 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
 
 
 def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = False) -> tuple[Request, str]:
-    """The request of a checkpoint with the options of `gonio resume` (output, spp, timeout, threads), and a notice
-    that states where its picture is written.
+    """The request of a checkpoint with the options of `gonio resume`, and a notice about the file of the picture.
 
-    change      the options to replace; None keeps the option of the original request
+    change      the options to replace: output, spp, timeout and threads; None uses the option of the original request
     allow_code  whether the scene may run the Python files that it names
-    writes      whether the picture will be written; if the original request named no file, to the scene's
+    writes      whether the picture will be written to a file: the one in the original request, or else the one that the
+                scene names
     """
     saved = load(path)
     if saved.facts["request"] is None:
@@ -237,8 +242,11 @@ def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = Fa
 
 
 def _placed(output: Path, checkpoint: Path) -> tuple[Path, str]:
-    """Where the picture of an untrusted checkpoint is written: the file that it names if that lies in the checkpoint's
-    folder, else one of that name next to the checkpoint, with a notice about it."""
+    """The file to which the picture of an untrusted checkpoint is written, and a notice about it.
+
+    This is the file that the checkpoint names if it is in the folder of the checkpoint, and otherwise a file of the
+    same name next to the checkpoint.
+    """
     folder = checkpoint.absolute().parent
     try:
         inside = output.resolve().is_relative_to(folder.resolve())

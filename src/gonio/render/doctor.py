@@ -1,7 +1,7 @@
-"""The rendering software of this machine: what is installed, what is missing, and how to install it.
+"""Check the rendering software of this machine: what is installed, what is missing, and how to install it.
 
-If an LLVM or a driver is incompatible, Dr.Jit aborts the whole process, and no error can be reported. Therefore every
-trial runs in a separate process.
+If LLVM or a driver is incompatible, Dr.Jit aborts the process without an exception. Therefore every trial runs in a
+separate process.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ assert 5 < total < 25, total
 print("variant", mi.variant())
 print("threads", dr.thread_count())
 """
-_TRIAL_SECONDS = 120  # a cold start compiles for some seconds; a machine that exceeds this cannot render either
+_TRIAL_SECONDS = 120  # the first start compiles for some seconds; if it exceeds this limit, the machine cannot render
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """All findings, the outcome of the trial on each device, and whether this machine can render at all."""
+    """All findings, the result of the trial on each device, and whether this machine can render."""
 
     findings: tuple[Finding, ...]
     devices: dict[str, str]  # device -> "" if it works, otherwise the problem
@@ -69,7 +69,7 @@ class Report:
 
 
 def examine() -> Report:
-    """Examine the machine; takes a few seconds, most of them in the trials."""
+    """Examine this machine. This takes a few seconds, mostly for the trials."""
     findings = [
         Finding("ok", "Gonio", f"{__version__}, Python {platform.python_version()}, {platform.platform(terse=True)}"),
         _package("mitsuba", "Mitsuba", "pip install mitsuba"),
@@ -112,7 +112,7 @@ def _package(name: str, subject: str, install: str) -> Finding:
 
 
 def _libraries() -> list[Finding]:
-    """Every LLVM that can be loaded, which one will be used, and why the others are not."""
+    """The findings on LLVM: every library that was found, which of them is used, and why others are not."""
     findings = []
     chosen = False
     for library in llvm.libraries():
@@ -131,9 +131,9 @@ def _libraries() -> list[Finding]:
 
 
 def _try(device: str) -> tuple[str, str]:
-    """Run the trial on a device in a separate process. Returns the problem ("" if there is none), and its output.
+    """Run the trial on a device in a separate process. Returns the problem, or "" if there is none, and the output.
 
-    Without -P, Python would import a numpy.py from the current folder.
+    The option -P prevents Python from importing modules, such as a numpy.py, from the current folder.
     """
     command = [sys.executable, "-P", "-c", _TRIAL.format(device=device)]
     try:

@@ -1,4 +1,4 @@
-"""Run a prepared render up to its sample count, in this process or on workers, with checkpoints."""
+"""Run a prepared render until its sample count is reached, in this process or on workers, with checkpoints."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def of_scene(prepared: Prepared) -> AbstractContextManager[None]:
-    """Report errors of the plugins of a Mitsuba scene as errors of the scene inside the `with` block."""
+    """Inside the `with` block, report errors of plugins in a Mitsuba scene as errors of the scene."""
     if not prepared.request.is_mitsuba:
         return nullcontext()
     return mitsuba_scene.rendering(prepared.request.scene, isinstance(prepared.render, MitsubaRender))
@@ -37,15 +37,15 @@ def execute(
     interrupted: Callable[[], object] = lambda: False,
     tell: Callable[[str], None] = lambda text: None,
 ) -> tuple[str, Keeper]:
-    """Advance a render to its sample count, continuing an earlier run if there is a checkpoint.
+    """Advance a render to its sample count. If there is a checkpoint, continue from it.
 
-    Returns why it ended, as `run` does, and the writer of the checkpoints, whose `remove` is to be called after the
-    picture has been written.
+    Returns the reason why the render ended, as `run` does, and the writer of the checkpoints. Its `remove` must be
+    called after the picture has been written.
 
-    temporary    path of an automatic checkpoint, used for long jobs whose request names none
-    long         seconds above which a job counts as long; a minute if None
+    temporary    path of an automatic checkpoint, used for long jobs whose request names no checkpoint
+    long         duration in seconds above which a job counts as long; a minute if None
     report       called with the progress after each pass
-    interrupted  called after each pass; a true result ends the render
+    interrupted  called after each pass; if the result is true, the render ends
     tell         called at the start with a notice if there is a checkpoint
     """
     from . import tiles
@@ -87,7 +87,7 @@ def execute(
 
 
 def _goal(prepared: Prepared) -> int | Callable[[], int]:
-    """Samples per pixel to reach: a number, or, for a render until an error, a function that returns it."""
+    """The number of samples per pixel to reach; for a render until an error, a function that returns this number."""
     from ..transport import until
 
     render = prepared.render
@@ -118,9 +118,9 @@ def execute_all(
     interrupted: Callable[[], object] = lambda: False,
     finished: Callable[[int], None] = lambda index: None,
 ) -> str:
-    """Run several renders at once on the current executor. Returns why this ended, as `run` does.
+    """Run several renders at once on the current executor. Returns the reason why they ended, as `run` does.
 
-    interrupted  called after each part; a true result ends the renders
+    interrupted  called after each part; if the result is true, the renders end
     finished     called with the index of each render that is done
     """
     from ..transport import integrators

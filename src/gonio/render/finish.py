@@ -1,4 +1,4 @@
-"""The end of a render: the picture, denoised if requested, and the file that it is written to."""
+"""Render to a file: run the render, denoise the picture if requested, and write it."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from .request import Request
 
 @dataclass(frozen=True)
 class Result:
-    """The result of a render.
+    """The result of a render to a file.
 
-    spp         samples per pixel that were rendered
-    stopped     why it ended early, "interrupt" or "timeout"; "" if it did not
+    spp         number of samples per pixel that were rendered
+    stopped     the reason why the render ended early, "interrupt" or "timeout"; "" if it was completed
     exposure    exposure of a .png, in stops
     error       estimated relMSE of the picture, if it was rendered until an error was reached
-    signal      number of the signal that interrupted it; 0 if none did
-    checkpoint  file from which it can be continued; None if there is none
+    signal      number of the signal that interrupted the render; 0 if there was none
+    checkpoint  file from which the render can be continued; None if there is none
     """
 
     output: Path
@@ -52,7 +52,7 @@ class Result:
 
 
 def estimated(prepared: Prepared) -> tuple[float | None, str]:
-    """(estimated relMSE of a picture rendered until an error is reached, a warning if it is too large)."""
+    """The estimated relMSE of a render until an error, and a warning if it exceeds this error."""
     wanted = prepared.request.until_error
     if wanted is None:
         return None, ""
@@ -72,14 +72,14 @@ def render_to_file(
     notice: Callable[[], None] = lambda: None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Render a scene to a file; on Ctrl-C, SIGTERM, SIGHUP or at the time limit, write the picture so far.
+    """Render a scene to a file. After Ctrl-C, SIGTERM, SIGHUP or the time limit, the unfinished picture is written.
 
-    report  called after each pass
-    notice  called at the first of these signals, from another thread
-    tell    called at the start with a notice if an earlier run left a checkpoint
+    report  called with the progress after each pass
+    notice  called from another thread when the first of these signals arrives
+    tell    called at the start with a notice if an earlier run has left a checkpoint
     """
     started = time.perf_counter()
-    with Interrupts(notice) as interrupts:  # before the imports, since an interrupted import can crash
+    with Interrupts(notice) as interrupts:  # before the imports, because an interrupted import can crash
         prepared = prepare(request, writes=True)
         interrupts.check()
         checkpoint = checkpoints.default_path(prepared.output)
@@ -117,12 +117,15 @@ def render_to_file(
 
 
 def with_slopes(prepared: Prepared, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The picture, and its derivatives below it: (1 + paths, height, width, 3)."""
+    """The picture followed by its derivatives, (1 + paths, height, width, 3)."""
     return np.stack([picture, *prepared.render.slopes()])  # type: ignore[attr-defined]  # of Gradients
 
 
 def picture_of(render: Renders, denoised: bool, output: Path | None = None) -> NDArray[np.float32]:
-    """The picture, denoised if requested; if that fails, write the noisy one to `output` and raise MachineError."""
+    """The picture of a render, denoised if requested.
+
+    If denoising fails, the noisy picture is written to `output`, and MachineError is raised.
+    """
     picture = render.image()
     if not denoised:
         return picture
@@ -133,5 +136,5 @@ def picture_of(render: Renders, denoised: bool, output: Path | None = None) -> N
         if output is None:
             raise
         images.write(output, picture)
-        hint = "that file holds the noisy picture; leave --denoise out"
+        hint = "that file contains the noisy picture; leave --denoise out"
         raise MachineError(f"the picture was not denoised: {summary(error)}", str(output), hint) from error

@@ -1,4 +1,4 @@
-"""The inputs of a picture, whose hashes let a checkpoint detect changes."""
+"""The inputs on which a picture depends, with hashes that reveal whether they have changed since a checkpoint."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ..work.kept import Facts
 
 @dataclass(frozen=True)
 class Sources:
-    """The inputs of a picture.
+    """The inputs on which a picture depends.
 
-    text     returns the scene as it is rendered, including overrides, as text; slow for large scenes
+    text     a function that returns the scene, including overrides, as text; slow for large scenes
     files    the files that the scene uses, by their names in the scene
     how      integrator, sampler, seed and all other settings, as text
     version  versions of Gonio, Mitsuba and Dr.Jit
@@ -36,7 +36,7 @@ class Sources:
         return Sources(text, files, how, facts.versions(), _device(mi))
 
     def identity(self) -> dict[str, str]:
-        """A hash or description of each input of the picture, keyed by the name that errors use for the input."""
+        """A hash or description of each input, by its name in errors."""
         identity = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
         identity |= {"settings": self.how, "scene": _hash(self.text().encode("utf-8", "surrogateescape"))}
         for name, path in self.files.items():
@@ -49,13 +49,18 @@ def _hash(content: bytes) -> str:
 
 
 def _device(mi: ModuleType) -> str:
-    """The device and its compiler: another processor or compiler may round differently."""
+    """The device and its compiler, because another processor or compiler may round differently."""
     variant = str(mi.variant())
     return f"{variant}, {facts.processor() if variant.startswith('llvm') else engine.cuda_device()}"
 
 
 def check(saved: Facts, identity: Mapping[str, str], where: str) -> None:
-    """Raise an InputError that names the first input that has changed since the checkpoint at `where` was written."""
+    """Raise InputError, which names the first changed input, if an input has changed since the checkpoint was written.
+
+    saved     the facts in the checkpoint
+    identity  the current hashes and descriptions of the inputs
+    where     path of the checkpoint
+    """
     before = saved.get("identity")
     before = before if isinstance(before, dict) else {}
     for name in [*identity, *before]:

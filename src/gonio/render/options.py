@@ -1,7 +1,7 @@
 """The options of a render, shared by requests, `go.render`, `go.study` and the command line.
 
-`RenderOptions` declares them, with their help texts. `RenderKeywords` repeats their types for type checks of
-`**options`, since Python cannot derive them from a class. This module imports nothing large, since
+`RenderOptions` declares the options, with their help texts. `RenderKeywords` repeats their types, because type checkers
+cannot derive the types of `**options` from a class. This module imports only small modules, because
 `gonio render --help` loads it.
 """
 
@@ -14,7 +14,7 @@ from ..arguments import takes_fields
 
 
 class Shown(NamedTuple):
-    """The help of an option: the placeholder of its value ("" for a flag) and a description."""
+    """The help of an option: the placeholder for its value ("" for a flag), and a description."""
 
     metavar: str
     help: str
@@ -22,7 +22,7 @@ class Shown(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # fewer methods to compile whenever `gonio` starts
 class RenderOptions:
-    """Options of a render; None selects the scene's value."""
+    """The options of a render. For None, the value in the scene is used."""
 
     spp: Annotated[int | None, Shown("N", "Samples per pixel.")] = None
     size: Annotated[tuple[int, int] | None, Shown("WxH", "Film size in pixels, such as 640x480.")] = None
@@ -30,7 +30,7 @@ class RenderOptions:
     max_depth: Annotated[
         int | None, Shown("N", "Maximum path length, for the integrators path, caustics and light.")
     ] = None
-    sampler: Annotated[str | None, Shown("NAME", "Sampler of random numbers: sobol, independent, ...")] = None
+    sampler: Annotated[str | None, Shown("NAME", "Random-number sampler: sobol, independent, ...")] = None
     seed: Annotated[int | None, Shown("N", "Seed of all random numbers; the same seed gives the same result.")] = None
     device: Annotated[str, Shown("cpu|cuda|auto", "Device to compute on; auto selects cuda if it is available.")] = (
         "cpu"
@@ -44,11 +44,11 @@ class RenderOptions:
         float | Literal["auto"], Shown("EV|auto", "Exposure of a .png file in stops; auto derives it from the picture.")
     ] = 0.0
     allow_outside: Annotated[bool, Shown("", "Allow the scene to read files outside its folder.")] = False
-    allow_code: Annotated[bool, Shown("", "Allow the scene to run the Python files and plugins that it names.")] = False
+    allow_code: Annotated[bool, Shown("", "Allow the scene to run the Python files and plugins it refers to.")] = False
 
 
 class RenderKeywords(TypedDict, total=False):
-    """The types of `RenderOptions` as keywords."""
+    """The fields of `RenderOptions` as keyword arguments, for type checkers."""
 
     spp: int | None
     size: tuple[int, int] | None

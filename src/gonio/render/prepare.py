@@ -1,4 +1,4 @@
-"""Prepare a render: read the scene of a request, start Mitsuba, and choose the integrator."""
+"""Prepare a render: read the scene of a request, load Mitsuba, and create the integrator."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A loaded scene and a render that is ready to advance."""
+    """A render that is ready to start, with its loaded scene and settings."""
 
     request: Request
     render: Renders
@@ -44,9 +44,9 @@ class Prepared:
 
 
 def prepare(request: Request, writes: bool = False) -> Prepared:
-    """Read the scene, start Mitsuba and create the render. Raises InputError or MachineError.
+    """Read the scene, load Mitsuba and create the render. Raises InputError or MachineError.
 
-    writes  whether the picture will be written; if the request names no output, to the file that the scene names
+    writes  whether the picture will be written to a file: the one in the request, or else the one that the scene names
     """
     request.check()
     if request.material is None and not os.path.exists(request.scene):
@@ -132,7 +132,7 @@ def _prepare_lab(request: Request, mi: ModuleType, names_output: bool) -> Prepar
 
 
 def _drawing(built: Scene, settings: Settings, request: Request) -> integrators.Render | until.Until:
-    """A render with one of Gonio's own integrators."""
+    """Create a render with one of Gonio's own integrators."""
     from ..transport import integrators, until
 
     if request.until_error is None:
@@ -141,7 +141,7 @@ def _drawing(built: Scene, settings: Settings, request: Request) -> integrators.
 
 
 def _most(request: Request, spp: int) -> int:
-    """Samples per pixel: as requested, those of the scene, or the limit if an error determines their number."""
+    """The number of samples per pixel: that of the request or the scene, or the limit for a render until an error."""
     return request.spp or (spp if request.until_error is None else MAX_SPP_UNTIL)
 
 
@@ -152,7 +152,7 @@ def _advice(render: Renders) -> list[str]:
 
 
 def _how(settings: Settings | None, request: Request, **more: images.Value) -> str:
-    """The settings that a picture depends on, as a string."""
+    """The settings on which a picture depends, as a string."""
     ours = {} if settings is None else {**asdict(settings), "program": _code_of(settings.program)}
     others: dict[str, images.Value] = {**more, "features": request.denoise}
     if request.until_error is not None:
@@ -163,7 +163,7 @@ def _how(settings: Settings | None, request: Request, **more: images.Value) -> s
 
 
 def _code_of(program: type) -> str:
-    """A hash of the source file of a user's integrator; its name if it is Gonio's or has no file."""
+    """A hash of the source file of a user's integrator; the name of an integrator that is Gonio's or has no file."""
     if program.__module__.startswith("gonio."):
         return program.__name__
     try:
@@ -173,7 +173,7 @@ def _code_of(program: type) -> str:
 
 
 def _settings(scene: Settings, request: Request) -> Settings:
-    """The scene's settings, overridden by the request's."""
+    """The settings of the scene, overridden by those of the request."""
     from ..transport.integrators.base import Integrator, check_sampler
 
     if request.integrator is not None:
@@ -195,7 +195,7 @@ def _settings(scene: Settings, request: Request) -> Settings:
 
 
 def _own(settings: Settings) -> dict[str, images.Value]:
-    """Metadata of a picture rendered with one of Gonio's own integrators."""
+    """The metadata of a picture rendered with one of Gonio's own integrators."""
     from ..transport import sampler
 
     metadata: dict[str, images.Value] = {
@@ -207,7 +207,7 @@ def _own(settings: Settings) -> dict[str, images.Value]:
 
 
 def _metadata(request: Request, mi: ModuleType, **how: images.Value) -> dict[str, images.Value]:
-    """Metadata that record how a picture was rendered."""
+    """The metadata that record how a picture was rendered."""
     metadata: dict[str, images.Value] = {
         "scene": str(request.scene),
         **how,

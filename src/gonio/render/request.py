@@ -16,21 +16,21 @@ from ..pictures import denoise, exposures, images
 from ..scene.film_size import check_film
 from .options import RenderOptions
 
-MAX_COUNT = 1 << 30  # samples per pixel, and path segments: kernels count them in 32 bits
+MAX_COUNT = 1 << 30  # maximum number of samples per pixel and of path segments, which kernels count in 32 bits
 MAX_SPP_UNTIL = 1 << 16  # default limit of samples per pixel for `until_error`
 MAX_THREADS = 1024
 
 
 @dataclass(frozen=True)
 class Request(RenderOptions):
-    """A scene or a material, and how to render it."""
+    """A request for a render: the scene or material, and the options."""
 
     scene: Path  # the name of the material if there is no scene
     output: Path | None = None
     timeout: float | None = None
     overrides: Mapping[str, object] = field(default_factory=dict)
     material: BSDF | None = None  # shown on a ball, in place of a scene
-    checkpoint: Path | None = None  # file of the sums so far; an existing one is continued
+    checkpoint: Path | None = None  # file of the accumulated samples; if it exists, the render continues from it
     until_error: float | None = None  # relMSE at which to stop; `spp` is then the maximum
     gradient: tuple[str, ...] = ()  # paths of values in the scene with respect to which the picture is differentiated
 
@@ -72,7 +72,7 @@ class Request(RenderOptions):
 
 
 def check_error(error: float, spp: int | None) -> None:
-    """Raise InputError for an error that is not positive and finite, or for too few samples to estimate it."""
+    """Raise InputError for a requested error that is not positive and finite, or for too few samples to estimate it."""
     if not (math.isfinite(error) and error > 0.0):
         raise InputError(f"a relMSE of {error:g}", "--until-error", "give more than 0, such as 0.01")
     if spp == 1:
@@ -80,7 +80,7 @@ def check_error(error: float, spp: int | None) -> None:
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """(width, height) of "640x480"."""
+    """Parse a size such as "640x480" to (width, height)."""
     match = re.fullmatch(r"\s*(\d{1,9})\s*[xX×]\s*(\d{1,9})\s*", text)  # noqa: RUF001 - people paste it
     if not match:
         raise InputError(f"'{text}' is not a size", "--size", "give width x height in pixels, such as 640x480")

@@ -1,5 +1,7 @@
-"""Requests as JSON, for checkpoints and for the workers of a cluster. The JSON is untrusted, as scenes are: every key,
-type and range is checked."""
+"""Convert requests to JSON and back, for checkpoints and for the workers of a cluster.
+
+Like scenes, the JSON is untrusted: every key, type and range is checked.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +21,12 @@ from ..material import BSDF
 from ..work.kept import Facts
 from .request import Request
 
-EXCLUDED = ("checkpoint", "timeout")  # fields not stored: the command that continues the render sets them
+EXCLUDED = ("checkpoint", "timeout")  # fields that are not stored: the command that continues the render sets them
 STRICT = ConfigDict(strict=True, extra="forbid", arbitrary_types_allowed=True)
 
 
 def described(request: Request) -> Facts:
-    """A request as plain values for a file. Raises InputError for a material that only this program defines."""
+    """Convert a request to plain values for a file. Raises InputError for a material that only this program defines."""
     values: Facts = {}
     for one in fields(Request):
         value = getattr(request, one.name)
@@ -49,7 +51,7 @@ def _plain(value: Any) -> Any:
 
 
 def request_of(given: Facts, where: str, allow_code: bool) -> Request:
-    """The request in a file; the inverse of `described`.
+    """The request from the values in a file, the inverse of `described`.
 
     where       the location that errors name
     allow_code  whether materials may be classes in Python files; the file itself cannot grant this
@@ -72,7 +74,7 @@ def request_of(given: Facts, where: str, allow_code: bool) -> Request:
 
 @functools.cache
 def _fields() -> type[BaseModel]:
-    """The fields that `described` writes, with their types."""
+    """A model of the fields that `described` writes, with their types."""
     hints = get_type_hints(Request)
     hints |= {"material": dict[str, Any] | None, "overrides": dict[str, Any]}
     types: Any = {one.name: (hints[one.name], ...) for one in fields(Request) if one.name not in EXCLUDED}
@@ -83,7 +85,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def validated(model: type[Model], given: Facts, where: str, pointer: str = "") -> Model:
-    """The facts of an untrusted file, validated by `model`.
+    """Validate the facts in an untrusted file with a pydantic model.
 
     where    name of the file in errors
     pointer  JSON pointer to the facts in the file

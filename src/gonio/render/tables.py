@@ -1,11 +1,12 @@
 """Energy tables on disk: the folder that `gonio bake` writes and `gonio info` reads.
 
-    tables.npz      every array and the manifest, float64
-    manifest.json   the manifest alone, for people and scripts
-    E.exr ...       float32 pictures, row 0 (lowest roughness) on top; .png the same in 8 bits, linear. The slices of a
-                    table with three axes are stacked vertically, the first on top
-With layout "homework": E.png, E_avg.png and dfg.png exactly as in the homework (`baked.homework_pictures`). The levels
-of an environment are level_0.exr, level_1.exr ...
+    tables.npz      all arrays, float64, and the manifest
+    manifest.json   the manifest alone
+    E.exr ...       float32 pictures of the tables, with row 0 (the lowest roughness) on top. The slices of a table with
+                    three axes are stacked vertically, the first on top. The .png files are the same in linear 8 bits
+
+With layout "homework", the folder contains E.png, E_avg.png and dfg.png exactly as in the homework
+(`baked.homework_pictures`). The levels of an environment are level_0.exr, level_1.exr and so on.
 """
 
 from __future__ import annotations
@@ -63,30 +64,34 @@ def bake(
     ndf: str | None = None,
     levels: int | None = None,
 ) -> Baked:
-    """Bake tables of directional albedo, its average, the split sum and rough glass, or prefilter an environment.
+    """Bake tables of the directional and mean albedo, the split sum and rough glass, or prefilter an environment.
 
         go.bake("ggx", "tables").arrays["E"]            # [roughness, mu]
         go.bake("sky.hdr", "sky", ndf="beckmann")       # level_0, level_1 ... [theta, phi, rgb]
 
-    target    a distribution by name (F = 1), a material, or an environment (.hdr, .exr, .npz; latitude-longitude), for
-              which "prefiltered" is the only table
-    output    folder for the files; if writing fails, none of them is written. None writes nothing
-    lut       any of "E", "Eavg", "dfg", "glass"; or "ltc" alone: linearly transformed cosines, with shader code for
-              quadrilateral area lights. None bakes every table that applies to the target, except glass
-    resolution  texels along each axis: 1 to 4096, by default 128; for "ltc" 2 to 256, by default 64 (anisotropic: 16)
-    method    "quadrature", or the density to sample: "cosine", the distribution's name, or "visible"
+    target    the name of a distribution (with F = 1), a material, or a latitude-longitude environment map (.hdr, .exr
+              or .npz), for which "prefiltered" is the only table
+    output    folder for the files, which are written completely or not at all; None writes no files
+    lut       tables to bake: any of "E", "Eavg", "dfg" and "glass", or only "ltc", which are linearly transformed
+              cosines, with shader code for quadrilateral area lights. None bakes every table except "glass" that
+              applies to the target
+    resolution  texels along each axis, 1 to 4096, by default 128; for "ltc", 2 to 256, by default 64, or 16 if the
+              target is anisotropic
+    method    "quadrature", or the density to sample: "cosine", the name of the distribution, or "visible"
     samples   number of samples per texel, unless `method` is "quadrature"
-    sampler   "hammersley", the same points for every texel; or, with `seed`, "independent" or "stratified"
-    masking   masking of a distribution
-    layout    "linear", "stretched" or "homework": linear axes, and its pictures of E or, if `store` is "1-E", of 1 - E
+    sampler   "hammersley", with the same points for every texel, or, with `seed`, "independent" or "stratified"
+    masking   masking term of a distribution
+    layout    "linear" or "stretched" axes, or "homework": linear axes and the pictures of the homework, which show E
+              or, if `store` is "1-E", 1 - E
     flip      whether the bottom row of the homework's pictures has the lowest roughness
-    wrap      whether values in these pictures are rounded down to bytes, and 256 wraps around to 0
+    wrap      whether values in these pictures are rounded down to bytes, with 256 wrapping around to 0
     aspect    alpha_y / alpha_x of a distribution, which adds an axis phi with `azimuths` entries
     floor     lower bound of the denominator of D, for method "cosine"
-    preset    "homework-text" or "homework-figure": the options of PRESETS, in place of `masking`, `method` and so on
-    ndf       for an environment: the distribution (None: ggx) of `levels` levels of roughness 0 to 1 (None: 6)
-    Tables of microfacets, except "ltc", are kept in the user's cache. Returns a Baked: `arrays` by name and `manifest`,
-    which describes each table and states its error.
+    preset    "homework-text" or "homework-figure", whose options in PRESETS replace `masking`, `method` and others
+    ndf       for an environment map: the distribution with which it is prefiltered; None selects ggx
+    levels    for an environment map: the number of levels, for roughness 0 to 1; None selects 6, fewer for a small map
+    Tables of microfacets, except "ltc", are stored in the user's cache. Returns a `Baked` with the tables, `arrays`, by
+    name, and a `manifest`, which describes each table and states its error.
     Raises InputError for invalid options or a folder that cannot be written, MachineError if the disk is full.
     """
     if preset is not None:
@@ -110,7 +115,7 @@ def _of_material(
     options: Mapping[str, Any],
     picture: Mapping[str, Any],
 ) -> Baked:
-    """The tables of a distribution or a material, written if a folder is given."""
+    """Bake the tables of a distribution or a material, and write them if a folder is given."""
     resolution = options["resolution"]
     if lut and "ltc" in lut:
         _check_ltc(lut, {**options, **picture, "resolution": None, "masking": None})
@@ -128,7 +133,7 @@ def _written(baked: Baked, folder: Path | None) -> Baked:
 
 
 def _baked(target: str | BSDF, lut: Sequence[str] | None, options: Mapping[str, Any]) -> Baked:
-    """The tables, with the options of `bake`."""
+    """Bake the tables; `options` are arguments of `bake`."""
     names = {"resolution": "size", "samples": "spp", "sampler": "points"}  # in `energy`
     given = {names.get(name, name): value for name, value in options.items()} | {"seed": options["seed"] or 0}
     sampling = Sampling(**{name: given.pop(name) for name in Sampling._fields})
@@ -139,7 +144,7 @@ LANGUAGES = ("glsl", "wgsl", "hlsl")  # of the code that comes with linearly tra
 
 
 def _check_ltc(lut: Sequence[str], options: dict[str, object]) -> None:
-    """Raise InputError for tables and options that do not go with linearly transformed cosines."""
+    """Raise InputError for tables and options that cannot be combined with linearly transformed cosines."""
     if len(lut) > 1:
         what = f"ltc with '{next(name for name in lut if name != 'ltc')}'"
         raise InputError(what, "--lut", "its axes differ: bake them into two folders")
@@ -147,7 +152,7 @@ def _check_ltc(lut: Sequence[str], options: dict[str, object]) -> None:
 
 
 def _cosines(target: str | BSDF, folder: Path | None, resolution: int | None, masking: str | None) -> Baked:
-    """Linearly transformed cosines, with shader code for light from quadrilaterals."""
+    """Bake linearly transformed cosines, with shader code for quadrilateral area lights."""
     material: Any = target
     if isinstance(target, str):
         made: Any = model("conductor")
@@ -173,7 +178,7 @@ def _homework(
     options: Mapping[str, Any],
     picture: Mapping[str, Any],
 ) -> Baked:
-    """Tables with linear axes; they and the homework's pictures of them are written if a folder is given."""
+    """Bake tables with linear axes, and write them and the homework's pictures of them if a folder is given."""
     if not isinstance(target, str) or options["aspect"] not in (None, 1.0):
         problem = "a material, or two widths, in the homework's layout"
         raise InputError(problem, "--layout", "give a distribution such as ggx, with one width")
@@ -186,7 +191,7 @@ def _homework(
     return baked
 
 
-# The homework's two definitions of E: the k of its text, without noise; and that of its cosine-sampled picture.
+# The homework's two versions of E: with the k of its text, without noise, and with that of its cosine-sampled picture
 PRESETS: dict[str, dict[str, Any]] = {
     "homework-text": {"masking": "schlick-direct"},
     "homework-figure": {
@@ -199,8 +204,10 @@ def _preset(
     target: MaterialLike, output: str | Path | None, preset: str, resolution: int, seed: int | None, store: str,
     flip: bool,
 ) -> Baked:  # fmt: skip
-    """E and E_avg as in the homework's text or in its figures. E_avg of the figures is free of noise, and in their
-    pictures bytes above 255 wrap around."""
+    """Bake E and E_avg as in the homework's text or as in its figures.
+
+    In the figures, E_avg has no noise, and bytes above 255 wrap around.
+    """
     if preset not in PRESETS:
         raise InputError(f"unknown preset '{preset}' of a table", "--preset", did_you_mean(preset, list(PRESETS)))
     if target != "ggx":
@@ -219,7 +226,7 @@ def _preset(
 
 
 def _homework_files(baked: Baked, store: str, flip: bool, wrap: bool) -> dict[str, bytes]:
-    """The homework's pictures by file name; their layout is recorded in the manifest."""
+    """The homework's pictures by file name. Their layout is recorded in the manifest."""
     baked.manifest["pictures"] = {"store": store, "bottom row": "lowest" if flip else "highest", "x": "n.v"}
     pictures = homework_pictures(baked, store, flip, wrap)
     return {f"{name}.png": images.png_bytes(pixels) for name, pixels in pictures.items()}
@@ -233,7 +240,7 @@ def _check_default(options: dict[str, object], hint: str) -> None:
 
 
 def _is_picture(target: MaterialLike, lut: Sequence[str] | None) -> bool:
-    """Whether the target is the picture of an environment. Raises InputError if the requested tables do not fit it."""
+    """Whether the target is a picture of an environment. Raises InputError for tables that do not apply to it."""
     pictured = isinstance(target, str | Path) and operands.kind_of(target, BAKED, "TARGET") is Kind.PICTURE
     others = [name for name in lut or () if name != "prefiltered"]
     if pictured and others:
@@ -245,7 +252,7 @@ def _is_picture(target: MaterialLike, lut: Sequence[str] | None) -> bool:
 
 
 def _prefiltered(picture: Path, folder: Path | None, ndf: str | None, levels: int | None, masking: str | None) -> Baked:
-    """The levels of an environment, also written as pictures if a folder is given."""
+    """Prefilter an environment map, and write its levels as pictures if a folder is given."""
     source = images.read(picture)
     if not source.hdr:
         what = "an 8-bit picture, whose values are clipped at white"
@@ -263,7 +270,7 @@ def _prefiltered(picture: Path, folder: Path | None, ndf: str | None, levels: in
 
 
 def _write(baked: Baked, folder: Path, contents: dict[str, bytes]) -> None:
-    """Write the pictures, tables.npz and manifest.json: all or none."""
+    """Write the pictures, tables.npz and manifest.json, either all or none of them."""
     baked.manifest["files"] = ["tables.npz", "manifest.json", *contents]
     contents["tables.npz"] = baked.npz()
     contents["manifest.json"] = (json.dumps(baked.manifest, indent=2) + "\n").encode()
@@ -271,7 +278,7 @@ def _write(baked: Baked, folder: Path, contents: dict[str, bytes]) -> None:
 
 
 def _target(target: MaterialLike) -> str | BSDF:
-    """A distribution's name, or a material."""
+    """Interpret a target: returns the name of a distribution, or a material."""
     if not isinstance(target, str | Path):
         return material(target)
     target = str(target)
@@ -304,13 +311,16 @@ def _own(target: str, name: str) -> str | BSDF:
 
 
 def _pictures(baked: Baked) -> dict[str, bytes]:
-    """Each table as a picture: mu to the right, roughness down, slices along a third axis stacked vertically."""
+    """A picture of each table, in which mu increases to the right and roughness downward.
+
+    The slices along a third axis are stacked vertically.
+    """
     files = {}
     for name, dims in baked.manifest["dims"].items():
         value = baked.arrays[name]
         if not dims:
             continue  # one number
-        if dims == ["roughness"]:  # repeated along mu, so that the picture is read with the coordinates of E
+        if dims == ["roughness"]:  # repeated along mu, so that the picture has the coordinates of E
             size = len(value)
             value = np.broadcast_to(value[:, None], (size, size, *value.shape[1:]))
         channels = value.shape[max(len(dims), 2) :] if dims != ["mu"] else value.shape[1:]
@@ -323,7 +333,7 @@ def _pictures(baked: Baked) -> dict[str, bytes]:
 
 
 def describe(path: str | Path) -> dict[str, Any]:
-    """The content of a baked folder or tables.npz: its manifest, and the range of each table."""
+    """Describe a baked folder or tables.npz: its manifest, and the range of values of each table."""
     baked = load(path)
     ranges = {n: [float(a.min()), float(a.max())] for n, a in baked.arrays.items()}
     return {**baked.manifest, "range": ranges}

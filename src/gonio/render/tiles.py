@@ -1,8 +1,9 @@
-"""Render one picture on several workers: each part is a range of its lanes, with all their samples.
+"""Render a picture on several workers: each part of the job consists of all samples of a range of lanes.
 
-Lanes are independent, and every part begins at a multiple of the processor's vector width, so that the same rays are
-traced together: the sums are bit-identical to those of a single process. A worker loads the scene from copies of its
-files, which are sent once and identified by a hash of their content.
+A lane is one of the array entries that a kernel processes in parallel. Lanes are independent, and every part begins at
+a multiple of the processor's vector width, so the same rays are traced together, and the accumulated samples are
+bit-identical to those of a single process. A worker loads the scene from copies of its files, which are sent once and
+identified by a hash of their content.
 """
 
 from __future__ import annotations
@@ -34,16 +35,16 @@ from .prepare import Prepared, prepare
 from .request import Request
 from .request_json import described, request_of
 
-ALIGNED = 64  # lanes: a multiple of any processor's vector width and of the camera's tiles of rays
-MAX_SAMPLES = 1 << 25  # per part: some seconds on one machine
-MIN_SAMPLES = 1 << 21  # per part: with fewer, sending it costs too much
+ALIGNED = 64  # lanes: a multiple of the vector width of all processors and of the camera's tiles of rays
+MAX_SAMPLES = 1 << 25  # samples per part, which take some seconds on one machine
+MIN_SAMPLES = 1 << 21  # samples per part; for fewer, sending the part would take too long in comparison
 SAMPLES_PER_SUBMISSION = 1 << 17  # samples that a worker traces while one part is submitted
-MAX_PASS = 2.0  # seconds: a worker need not react to Ctrl-C, and each pass costs 15 ms of Python
-PARTS = 20  # smallest number of parts per worker, so that no worker is idle for long at the end
+MAX_PASS = 2.0  # seconds per pass: long, because workers do not react to Ctrl-C, and each pass takes 15 ms in Python
+PARTS = 20  # minimum number of parts per worker, so that no worker is idle for long at the end
 
 
 class Gathered:
-    """The sums received from workers so far, with the interface of a render, for `checkpoints.Keeper`."""
+    """The accumulated samples received from workers, with the interface of a render, for `checkpoints.Keeper`."""
 
     def __init__(self, render: Render, wanted: int) -> None:
         self._render, self._wanted = render, wanted
@@ -58,7 +59,7 @@ class Gathered:
 
     @property
     def samples(self) -> int:
-        """Samples so far, summed over all lanes."""
+        """The number of samples so far, summed over all lanes."""
         return int(self.arrays[LANES].sum(dtype=np.int64))
 
     @property
@@ -66,11 +67,11 @@ class Gathered:
         return len(self.arrays[LANES])
 
     def samples_in(self, lanes: slice) -> int:
-        """Samples so far, summed over these lanes."""
+        """The number of samples so far, summed over the given lanes."""
         return int(self.arrays[LANES][lanes].sum(dtype=np.int64))
 
     def put(self, lanes: slice, arrays: Arrays) -> None:
-        """Store the sums of a finished part."""
+        """Store the accumulated samples of a finished part."""
         for name, values in arrays.items():
             self.arrays[name][lanes] = values
         self.arrays[LANES][lanes] = self._wanted
@@ -79,7 +80,7 @@ class Gathered:
         return {name: values.copy() for name, values in self.arrays.items()}
 
     def give(self) -> None:
-        """Copy the sums into the render."""
+        """Copy the accumulated samples into the render."""
         self._render.restore(self.done, self.arrays)
 
     def advance(self, count: int) -> None:
@@ -106,12 +107,13 @@ def advance(
     finished: Callable[[int], None] = lambda index: None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> str:
-    """Advance every lane of several renders to its sample count on the workers; return why this ended, as `passes.run`
-    does.
+    """Advance several renders to their sample counts on the workers.
 
-    report       called after each part, with the progress of all renders together
-    interrupted  called after each part; a true result ends the renders
-    timeout      time limit, in the unit of `clock` (s); None: none
+    Returns the reason why they ended, as `passes.run` does.
+
+    report       called after each part with the progress of all renders together
+    interrupted  called after each part; if the result is true, the renders end
+    timeout      time limit in the unit of `clock` (s); None for no limit
     finished     called with the index of a render when its last part has arrived
     """
     begin, parts, arguments = clock(), [], []
@@ -152,13 +154,19 @@ def advance(
 
 
 def part_size(total: int, workers: int) -> int:
-    """Samples per part for `total` samples: few enough to occupy all workers, and many enough that submitting parts, at
-    about 10 ms each, keeps pace with the workers (`benchmarks/cluster.py`)."""
+    """The number of samples per part for `total` samples.
+
+    It is small enough to occupy all workers, and large enough that submitting the parts, which takes about 10 ms each,
+    is not slower than the workers (`benchmarks/cluster.py`).
+    """
     return min(max(total // (PARTS * workers), MIN_SAMPLES, workers * SAMPLES_PER_SUBMISSION), MAX_SAMPLES)
 
 
 def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
-    """Ranges of lanes that still need samples, about `samples` each; all lanes of a range have equally many so far."""
+    """Ranges of lanes that still need samples, about `samples` per range.
+
+    All lanes of a range have the same number of samples so far.
+    """
     pixels = len(done)
     step = max(samples // wanted // ALIGNED, 1) * ALIGNED
     edges = sorted({*range(0, pixels, step), *(np.flatnonzero(np.diff(done)) + 1).tolist(), pixels})
@@ -167,7 +175,7 @@ def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
 
 
 def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
-    """A prepared render as a string from which a worker can rebuild it, and the files that it needs, by content hash.
+    """A string from which a worker can rebuild a prepared render, and the files that it needs, by content hash.
 
     Raises InputError for a render that cannot be distributed.
     """
@@ -198,15 +206,17 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
 
 # ---------------------------------------------------------------------- on the worker
 
-_last: dict[str, tuple[Prepared, tempfile.TemporaryDirectory[str]]] = {}  # the loaded scene; consecutive parts share it
-_copies: dict[str, Path] = {}  # copies of the scene's files, by their paths on the machine that submitted the job
+# the loaded scene, which consecutive parts share
+_last: dict[str, tuple[Prepared, tempfile.TemporaryDirectory[str]]] = {}
+_copies: dict[str, Path] = {}  # copies of the scene's files, by their paths on the submitting machine
 _rates: dict[str, float] = {}  # samples per second of the scene's last part
 
 
 def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays | None) -> Arrays:
-    """The sums of lanes [begin, end): samples [first, last) added to `start`, None for no sums.
+    """Render samples [first, last) of lanes [begin, end), and return the accumulated samples.
 
-    spec  the render, as returned by `travelling`
+    spec   the render, as returned by `travelling`
+    start  the accumulated samples before `first`; None if there are none
     """
     with _places_as_given():
         render = _prepared(spec).render
@@ -225,7 +235,7 @@ def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays |
 
 @contextlib.contextmanager
 def _places_as_given() -> Iterator[None]:
-    """Inside the block, errors name the files of the machine that submitted the job instead of their copies here."""
+    """Inside the `with` block, errors name the files on the submitting machine instead of their copies here."""
     try:
         yield
     except Exception as error:
@@ -253,7 +263,7 @@ def _prepared(spec: str) -> Prepared:
 
 
 def _unpacked(known: Facts, folder: Path) -> Request:
-    """The request, with its files in a folder of this machine."""
+    """The request, whose files are copied to a folder on this machine."""
     text = json.dumps(known["request"])
     for path, content in known["files"].items():
         # the same layout of folders, so that Python files can import modules from their own folder
@@ -266,4 +276,4 @@ def _unpacked(known: Facts, folder: Path) -> Request:
     known_request = json.loads(text)
     if known["folder"]:
         known_request["scene"] = str(folder / os.path.relpath(known_request["scene"], known["folder"]))
-    return request_of(known_request, "cluster", allow_code=True)  # allowed on the machine that submitted the job
+    return request_of(known_request, "cluster", allow_code=True)  # the submitting machine has allowed it

@@ -1,4 +1,4 @@
-"""report.html: the text of a report with its pictures and tables in a single file, which needs no network."""
+"""report.html: the text of a report with its pictures and tables, in a single file that needs no network."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from markdown_it.token import Token
 
 MAX_BYTES = 64 << 20  # total size of the pictures of a page
-MAX_ROWS = 2000  # rows of a table; browsers are slow with more, and nobody reads them
+MAX_ROWS = 2000  # rows of a table; browsers are slow with more, and such tables are not readable
 _HEAD = """<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
@@ -34,7 +34,7 @@ _HEAD = """<!doctype html>
 
 
 def page(text: str, folder: Path, allow_outside: bool = False) -> str:
-    """The page for the text of a report, which is Markdown; HTML in it is shown as text.
+    """The page for the text of a report, which is Markdown. HTML in the text is displayed literally.
 
     folder  the folder of report.md, to which the paths of pictures and tables are relative
     Raises InputError, with file and line, for a picture or table that cannot be shown.
@@ -49,7 +49,8 @@ def page(text: str, folder: Path, allow_outside: bool = False) -> str:
 
 
 class _Reader:
-    """Converts tokens to HTML; a paragraph that is only a picture, or a link to a .csv file, becomes a figure."""
+    """Converts tokens to HTML. A paragraph that consists only of a picture, or of a link to a .csv file, becomes a
+    figure."""
 
     def __init__(self, markdown: MarkdownIt, folder: Path, allow_outside: bool) -> None:
         self.markdown, self.folder, self.allow_outside = markdown, folder, allow_outside

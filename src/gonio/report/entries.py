@@ -1,5 +1,5 @@
-"""The kinds of figures of a report. Each is made by the code of the verb of the same name, as a file in the folder
-`figures`."""
+"""The kinds of figures of a report. Each figure is created by the code of the verb of the same name, as a file in the
+folder `figures`."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ Words = Annotated[str, Field(min_length=1)]
 
 @dataclass(frozen=True)
 class Making:
-    """The options and the folder with which figures are made.
+    """Options and folder for the creation of figures.
 
-    options  options of all pictures, as given by the command; those that differ from their defaults override the list
+    options  options of all pictures, from the command line; those that differ from their defaults override the list
     folder   the folder of the figures
     tell     called with notices about results of an earlier run
     """
@@ -54,7 +54,7 @@ class Facts:
 
 
 class PictureKeys(Part):
-    """Options of one picture or of all: the options of `gonio render` that change the picture."""
+    """Options of one picture or of all pictures: those options of `gonio render` that affect the picture."""
 
     spp: Whole | None = Field(default=None, ge=1)
     size: str | None = None
@@ -67,7 +67,7 @@ class PictureKeys(Part):
     exposure: Number | Literal["auto"] | None = None
 
     def request(self, given: RenderOptions) -> dict[str, Any]:
-        """The options as those of a Request; options given by the command take precedence."""
+        """The options as arguments of a Request. Options given on the command line take precedence."""
         options = {one.name: getattr(given, one.name) for one in fields(RenderOptions)}
         for one in fields(RenderOptions):
             own = getattr(self, one.name, None)
@@ -78,9 +78,9 @@ class PictureKeys(Part):
 
 
 class Figure(Part):
-    """A figure. `heading`, `caption` and `text` are its initial text in report.md, where it is edited later.
+    """A figure. `heading`, `caption` and `text` are copied to a new report.md, where they are edited later.
 
-    name  the name of its file, without suffix
+    name  the name of the figure's file, without suffix
     """
 
     suffix: ClassVar[str] = ".png"
@@ -91,28 +91,28 @@ class Figure(Part):
     text: str = ""
 
     def with_defaults(self, common: PictureKeys, scene: str) -> Figure:
-        """The figure, with the options and scene of the list for those that it does not set itself."""
+        """The figure, with the list's options and scene in place of missing ones."""
         return self
 
     def title(self) -> str:
-        """The heading if none is given."""
+        """The heading that is used if none is given."""
         raise NotImplementedError
 
     def description(self) -> str:
-        """The caption if none is given."""
+        """The caption that is used if none is given."""
         raise NotImplementedError
 
     def command(self, given: RenderOptions) -> str:
-        """The command that makes only this figure.
+        """The command that creates only this figure.
 
         given  options of all pictures
         """
         raise NotImplementedError
 
     def identity(self, making: Making) -> str:
-        """Check everything that can be checked before rendering. Returns a hash of everything that the figure depends
-        on, or "" for a figure that takes only seconds and is made each time. Raises InputError for a figure that cannot
-        be made."""
+        """Check all inputs that can be checked before rendering. Returns a hash of everything that the figure depends
+        on, or "" for a figure that takes only seconds and is created in every run. Raises InputError for a figure that
+        cannot be created."""
         raise NotImplementedError
 
     def make(self, making: Making, file: Path) -> Facts:
@@ -183,7 +183,7 @@ class Render(SceneFigure):
 
 
 class Study(SceneFigure):
-    """A sheet of pictures for several values, as made by `gonio study`."""
+    """A contact sheet of pictures for several values, as created by `gonio study`."""
 
     type: Literal["study"]
     vary: Annotated[list[Words], Field(min_length=1)]
@@ -216,7 +216,7 @@ class Study(SceneFigure):
 
 
 class Plot(Figure):
-    """A plot of materials, as made by `gonio plot`."""
+    """A plot of materials, as created by `gonio plot`."""
 
     type: Literal["plot"]
     model: Annotated[list[Words], Field(min_length=1)]
@@ -228,8 +228,8 @@ class Plot(Figure):
 
     def description(self) -> str:
         subject = {
-            "lobe": "Lobes (polar) of", "slice": "Values over the angle of light of", "albedo": "Albedo of",
-            "image": "Values over half vector and difference angle of",
+            "lobe": "Polar plots of the lobes of", "slice": "Slices through the lobes of", "albedo": "Albedo of",
+            "image": "Image slices of",
         }[self.kind]  # fmt: skip
         return f"{subject} {', '.join(self.model)}."
 
@@ -252,7 +252,7 @@ class Plot(Figure):
 
 
 class Bake(Figure):
-    """Albedo tables, as made by `gonio bake`, and a figure of them. A folder next to the figure contains the tables."""
+    """A figure of albedo tables, as created by `gonio bake`. A folder next to the figure contains the tables."""
 
     type: Literal["bake"]
     target: Words = "ggx"
@@ -291,7 +291,7 @@ class Bake(Figure):
 
 
 class Check(Figure):
-    """A table of verdicts about the student's own work, as given by `gonio check`."""
+    """A table of verdicts on the student's own work, as given by `gonio check`."""
 
     suffix: ClassVar[str] = ".csv"
     type: Literal["check"]
@@ -306,7 +306,7 @@ class Check(Figure):
         return f"Check of {Path(self.work).name}"
 
     def description(self) -> str:
-        return f"Judgment of {Path(self.work).name} by gonio check."
+        return f"Verdict of gonio check on {Path(self.work).name}."
 
     def command(self, given: RenderOptions) -> str:
         words = [self.work, *([self.against] if self.against else [])]
@@ -331,9 +331,9 @@ class Check(Figure):
         )
         rows: list[tuple[str, ...]]
         if isinstance(result, Submissions):
-            rows = [("submission", "task", "file", "judgment", "points", "probable mistake"), *result.rows()]
+            rows = [("submission", "task", "file", "verdict", "points", "probable mistake"), *result.rows()]
         else:
-            rows = [("work", "judgment", "probable mistake", "measured")]
+            rows = [("work", "verdict", "probable mistake", "details")]
             rows.append((result.name, result.status, result.cause, "; ".join(result.facts)))
         file.write_text(as_csv(rows), encoding="utf-8")
         return Facts("")

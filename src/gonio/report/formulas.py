@@ -13,17 +13,17 @@ from ..viewer.figures import load_matplotlib
 if TYPE_CHECKING:
     from markdown_it import MarkdownIt
 
-_SIZE = 12.0  # font size in the SVG, points; the page scales it to the size of its text
+_SIZE = 12.0  # font size in the SVG, in points; the page scales the SVG to the size of its text
 
 
 def plugin(markdown: MarkdownIt) -> None:
-    """Let a Markdown parser recognize formulas."""
+    """Make a Markdown parser recognize formulas."""
     markdown.inline.ruler.before("escape", "formula", _rule)
     markdown.add_render_rule("formula", lambda renderer, tokens, index, options, env: _html(tokens[index], env))
 
 
 def _rule(state: Any, silent: bool) -> bool:
-    """Parse $...$, without spaces just inside it so that prices are not formulas, or $$...$$."""
+    """Parse $$...$$, or $...$ without spaces next to the dollar signs, so that prices are not parsed as formulas."""
     text, start = state.src, state.pos
     if text[start] != "$":
         return False

@@ -18,19 +18,20 @@ from ..scene.reader import explain
 from .entries import Bake, Check, Figure, PictureKeys, Plot, Render, Study
 
 LIST_FILE = "report.toml"
-MAX_BYTES = 1 << 20  # size of a list, which people write by hand
-WORDS = frozenset({"title", "author", "heading", "caption", "text"})  # keys of prose, which names no files
+MAX_BYTES = 1 << 20  # size of a list, which is written by hand
+WORDS = frozenset({"title", "author", "heading", "caption", "text"})  # keys whose values are prose, not file names
 _OUTSIDE = re.compile(r"(?:^|[=,(\s])(?:/|~|[A-Za-z]:\\|\.\.(?:[/\\]|$))|[/\\]\.\.(?:[/\\]|$)")
 _KIND = re.compile(r"(lobe|slice|albedo|image)=(.*)", re.DOTALL)
 
 
 class ListFile(PictureKeys):
-    """A report.toml: title and author of the document, options of all its pictures, and its figures in order."""
+    """A report.toml: title and author of the document, options of all pictures, and the figures in order."""
 
     title: str = ""
     author: str = ""
     scene: str = ""
-    """The scene of figures that name none; by default the list's own folder if it has a scene.json."""
+    """The scene of figures without a scene of their own; by default, the folder of the list if it contains a
+    scene.json."""
     figure: list[Annotated[Render | Study | Plot | Bake | Check, Field(discriminator="type")]]
 
 
@@ -38,8 +39,8 @@ class ListFile(PictureKeys):
 class Listing:
     """The figures of a report in order.
 
-    locations  where each is declared: a file with a JSON pointer, or an option
-    folder     the folder to which their paths are relative
+    locations  the location of each figure's declaration: a file with a JSON pointer, or an option
+    folder     the folder to which the paths of the figures are relative
     """
 
     title: str
@@ -51,8 +52,8 @@ class Listing:
 
 
 def listing(target: str, options: Mapping[str, Sequence[str] | None], allow_code: bool, allow_outside: bool) -> Listing:
-    """The list in a .toml, or in the report.toml of a scene's folder if no option lists figures; otherwise the list
-    given by the options.
+    """The list in a .toml, or in the report.toml of a scene's folder if no option specifies figures; otherwise, the
+    list given by the options.
 
     target   a .toml, a scene or a material
     options  the values of "study", "plot", "bake" and "work"
@@ -104,7 +105,7 @@ def _toml(file: Path) -> dict[str, Any]:
 
 
 def _check_names(raw: Mapping[str, Any], file: Path, allow_code: bool, allow_outside: bool) -> None:
-    """Raise InputError if the list names Python files or files outside its folder, unless that is allowed."""
+    """Raise InputError if the list refers to Python files or to files outside its folder, unless this is allowed."""
     for pointer, text in _strings(raw, ""):
         if not allow_code and (outside.names_code(text.partition("(")[0]) or ".py:" in text):
             raise InputError(f"'{text}' runs a Python file", f"{file}#{pointer}", "add --allow-code if you trust it")
@@ -114,7 +115,7 @@ def _check_names(raw: Mapping[str, Any], file: Path, allow_code: bool, allow_out
 
 
 def _leads_out(folder: Path, text: str) -> bool:
-    """Whether a path, after following links, leads out of the folder."""
+    """Whether a path, with links resolved, is outside the folder."""
     try:
         path = (folder / text).resolve()
         return path.exists() and not path.is_relative_to(folder.resolve())
@@ -123,7 +124,7 @@ def _leads_out(folder: Path, text: str) -> bool:
 
 
 def _strings(value: object, pointer: str) -> Iterator[tuple[str, str]]:
-    """All strings that may name something, each with its JSON pointer."""
+    """All strings that may refer to files or code, each with its JSON pointer."""
     if isinstance(value, str):
         yield pointer, value
     elif isinstance(value, Mapping):
@@ -136,7 +137,7 @@ def _strings(value: object, pointer: str) -> Iterator[tuple[str, str]]:
 
 
 def _of_options(target: str, options: Mapping[str, Sequence[str] | None]) -> Iterator[tuple[Figure, str]]:
-    """The scene itself, then the figures that the options list, each with its option."""
+    """The scene itself, followed by the figures specified by the options, each with its option."""
     yield Render(type="render", scene=target), "TARGET"
     for text in options.get("study") or ():
         yield Study(type="study", scene=target, vary=_parts(text)), "--study"

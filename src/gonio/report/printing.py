@@ -1,4 +1,4 @@
-"""Print a page to a PDF with a Chromium installed on this machine."""
+"""Printing of a page to a PDF file by a Chromium browser that is installed on this machine."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ def browser() -> str:
 
 
 def write_pdf(page: Path, output: Path) -> Path:
-    """Print a page to a PDF file. Raises MachineError if that fails."""
+    """Print a page to a PDF file. Raises MachineError if printing fails."""
     program = browser()
-    # Chromium's sandbox does not start as root; the page runs no script, and its policy lets it load nothing.
+    # Chromium's sandbox does not start as root; the page runs no script, and its security policy blocks all resources.
     own = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
 
     def fill(file: Path) -> None:

@@ -1,4 +1,4 @@
-"""`gonio report` and `go.report`: make the figures of a list, then the document that shows them."""
+"""`gonio report` and `go.report`: create the figures of a list, and the document that contains them."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from . import document, printing, words
 from .entries import Facts, Figure, Making, as_csv
 from .listing import Listing, listing
 
-MADE_FILE = "made.json"  # in the folder of figures: hashes of what each depends on, to skip those that are up to date
+MADE_FILE = "made.json"  # in the folder of figures: hashes of the inputs of each figure, to skip unchanged figures
 
 
 @dataclass(frozen=True)
 class Report:
-    """A document that was written.
+    """The result of `report`: the files of a lab report.
 
     output     the page, a single file that needs no network
-    words      report.md, which its author edits
-    pdf        the printed page, None if it was not requested
+    words      report.md, which is edited by its author
+    pdf        the printed page; None if it was not requested
     figures    files of the figures, in order
     unchanged  number of figures that were up to date
-    new_words  whether this call wrote report.md
-    unused     lines for report.md, one for each figure that it does not show
+    new_words  whether this call created report.md
+    unused     lines to insert into report.md, one for each figure that it does not include
     """
 
     output: Path
@@ -67,23 +67,24 @@ def report(
     output: str | Path | None = None,
     **options: Unpack[RenderKeywords],
 ) -> Report:
-    """Write the pictures, tables, plots and verdicts of a lab report as one document, with text that you edit.
+    """Create a lab report from pictures, contact sheets, plots, tables, verdicts and text of your own.
 
         go.report("examples/phong", study=["shapes.1.material.p=4,16,64"], plot=["slice=phong(p=16)"])
         go.report("lab2.toml", pdf=True)
 
-    target  a list of figures (.toml), or a scene or material; a scene's folder may have a report.toml
-    study   sheets of the scene, each with one variation, "NAME=V1,V2", or two for a grid, separated by a semicolon
-    plot    materials, separated by semicolons, as lobes; "slice=phong(p=4)" gives another kind of plot
-    bake    distributions or materials whose albedo tables are shown
-    work    your own work to be judged: "f.csv; oren-nayar(sigma=0.3)"
+    target  a list of figures (.toml), a scene or a material; a scene's folder may contain a report.toml
+    study   contact sheets of the scene; each has one variation, "NAME=V1,V2", or two, separated by a semicolon, for a
+            grid
+    plot    materials to plot, separated by semicolons, as lobes; "slice=phong(p=4)" selects another kind of plot
+    bake    distributions or materials whose albedo tables are included
+    work    your own work to check: "f.csv; oren-nayar(sigma=0.3)"
     title   heading of a new report.md
-    pdf     also print the page, with a Chromium installed on this machine
-    output  folder of the report; None is NAME-report in the current folder
+    pdf     also print the page to a PDF file, with a Chromium browser installed on this machine
+    output  folder of the report; None selects NAME-report in the current folder
     The folder contains report.md, report.html and the figures. report.md is written only if it is missing: edit its
-    text, and call again. Unchanged figures are not made again.
+    text, and call the function again. Unchanged figures are not created again.
     Other options are as in `go.render`, for all pictures. Returns a Report. Raises InputError for an invalid list,
-    scene or option, MachineError if this machine cannot render or print it.
+    scene or option, MachineError if this machine cannot render the pictures or print the page.
     """
     lists = {"study": study, "plot": plot, "bake": bake, "work": work}
     tell = functools.partial(warnings.warn, category=GonioWarning, stacklevel=3)
@@ -104,10 +105,11 @@ def write(
     step: Callable[[int, int, str], None] = lambda done, total, state: None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Report:
-    """Make the figures and the document.
+    """Create the figures and the document.
 
     lists  the values of "study", "plot", "bake" and "work"
-    step   called before each figure with the number of figures made, their total number, and the name of the next one
+    step   called before each figure, with the number of completed figures, their total number, and the name of the next
+           figure
     tell   called with notices about results of an earlier run
     The other arguments are as in `report`.
     """
@@ -146,7 +148,7 @@ def write(
 
 
 def _read(file: Path) -> str | None:
-    """The text of report.md, None if the file does not exist. Raises InputError if it is not a text file."""
+    """The text of report.md; None if the file does not exist. Raises InputError if it is not a text file."""
     try:
         return file.read_text(encoding="utf-8") if os.path.lexists(file) else None
     except (OSError, UnicodeDecodeError) as error:
@@ -170,7 +172,7 @@ def _file_names(content: Listing) -> list[str]:
 def _make(
     content: Listing, names: Sequence[str], making: Making, step: Callable[[int, int, str], None]
 ) -> tuple[list[Facts], int]:
-    """Make each figure that has changed; returns the facts of all, and the number of unchanged ones."""
+    """Create each figure that has changed. Returns the facts of all figures, and the number of unchanged figures."""
     total = len(names)
     todo: list[tuple[str, Figure, str]] = list(zip(names, content.figures, content.locations, strict=True))
     identities = []
@@ -199,7 +201,7 @@ def _make(
 
 @contextlib.contextmanager
 def _located(location: str) -> Any:
-    """Add the location where a figure is declared to errors about it."""
+    """Add the location of a figure's declaration to errors about the figure."""
     try:
         yield
     except InputError as error:
@@ -225,5 +227,5 @@ def _write_settings(content: Listing, names: Sequence[str], facts: Sequence[Fact
 
 
 def given(options: RenderOptions) -> RenderOptions:
-    """The options of a render, copied from an object that has more fields."""
+    """The options of a render, copied from an object with additional fields."""
     return RenderOptions(**{one.name: getattr(options, one.name) for one in fields(RenderOptions)})

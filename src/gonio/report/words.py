@@ -1,6 +1,6 @@
-"""report.md: the text of a report and the places of its figures.
+"""report.md: the text of a report, with references to its figures.
 
-Gonio writes the file once and from then on only reads it; its author edits it.
+Gonio writes the file once and afterwards only reads it. The author edits the file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PICTURES = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".gif": "gif", ".web
 
 
 class Reference(NamedTuple):
-    """A picture or table that the text shows."""
+    """A reference to a picture or table in the text."""
 
     line: int
     target: str
@@ -36,25 +36,25 @@ def first_words(title: str, author: str, figures: Sequence[tuple[str, Figure]]) 
     """
     blocks = [f"# {title}", author or "*Your name, the date*"]
     if not any(figure.text for _, figure in figures):
-        blocks.append("*What was asked, and what you did, in a few sentences.*")
+        blocks.append("*Summarize the assignment and your work in a few sentences.*")
     for name, figure in figures:
         blocks += [
             f"## {figure.heading or figure.title()}",
-            figure.text.strip() or "*What can be seen, and why?*",
+            figure.text.strip() or "*What does the figure show, and why?*",
             inclusion(name, figure),
         ]
-    blocks += ["## How the figures were made", f"[Each figure with its command]({FOLDER}/{SETTINGS})"]
+    blocks += ["## Commands for the figures", f"[Each figure with its command]({FOLDER}/{SETTINGS})"]
     return "\n\n".join(blocks) + "\n"
 
 
 def inclusion(file: str, figure: Figure) -> str:
-    """The line of report.md that shows a figure."""
+    """The line of report.md that includes a figure."""
     caption = figure.caption.strip() or re.sub(r"([][*_`$\\])", r"\\\1", figure.description())
     return f"{'' if file.endswith('.csv') else '!'}[{' '.join(caption.split())}]({FOLDER}/{file})"
 
 
 def parser() -> MarkdownIt:
-    """A parser of Markdown with tables and formulas; it treats HTML as text."""
+    """A Markdown parser with support for tables and formulas. HTML is treated as text."""
     from markdown_it import MarkdownIt
 
     markdown = MarkdownIt("commonmark", {"html": False}).enable(["table", "strikethrough"])
@@ -63,7 +63,7 @@ def parser() -> MarkdownIt:
 
 
 def references(text: str) -> Iterator[Reference]:
-    """The pictures and tables that the text shows, with their line numbers."""
+    """The references to pictures and tables in the text, with their line numbers."""
     for token in parser().parse(text):
         for child in token.children or ():
             target = str(child.attrs.get("src" if child.type == "image" else "href", ""))
@@ -72,9 +72,9 @@ def references(text: str) -> Iterator[Reference]:
 
 
 def check_references(text: str, folder: Path, made: Collection[str], allow_outside: bool) -> None:
-    """Raise InputError for a picture or table that does not exist and is not about to be made.
+    """Raise InputError for a referenced picture or table that neither exists nor will be created.
 
-    made           files in the folder `figures` that the list makes
+    made           files in the folder `figures` that are created from the list
     allow_outside  allow files outside the folder
     """
     for line, target in references(text):
@@ -83,8 +83,8 @@ def check_references(text: str, folder: Path, made: Collection[str], allow_outsi
 
 
 def local(folder: Path, target: str, location: str, allow_outside: bool) -> Path:
-    """The path of a picture or table that the text shows. Raises InputError, which names `location`, if it cannot be
-    used."""
+    """The path of a picture or table to which the text refers. Raises InputError with the given `location` if the file
+    cannot be used."""
     if re.match(r"[a-zA-Z][a-zA-Z+.-]+:", target):
         raise InputError(f"'{target}' is not a file", location, "save it in the report's folder, and name it there")
     path = folder / target

@@ -1,4 +1,4 @@
-"""Scenes in the lab's JSON format with Gonio's additions: reading, validation, and construction of a Mitsuba scene.
+"""Scenes in the lab's JSON format, with Gonio's additions: reading, validation, and construction of a Mitsuba scene.
 
 from gonio import scene
 from gonio.bridge import engine

@@ -1,4 +1,4 @@
-"""The scene that shows a single material: a ball on a checkered floor in a dark studio with three soft lamps."""
+"""The scene in which a single material is shown: a ball on a checkered floor in a dark studio with three soft lamps."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from . import overrides as override
 from .materials import MaterialPart, described
 from .schema import SceneDescription
 
-TILES = 12  # tiles along a side of the floor
-TILE = 0.6  # side of a tile
+TILES = 12  # number of tiles along a side of the floor
+TILE = 0.6  # side length of a tile
 
 
 def of_material(material: BSDF, overrides: Mapping[str, object] | None = None) -> SceneDescription:
-    """The scene of a ball of that material, with `overrides` as in `reader.read`."""
+    """The scene with a ball of the given material; `overrides` as in `reader.read`."""
     raw = _raw(material.name or type(material).__name__, described(material))
     if overrides:
         override.apply(raw, overrides)
@@ -38,7 +38,7 @@ def _raw(name: str, material: MaterialPart) -> dict[str, Any]:
         for x in range(TILES)
         for z in range(TILES)
     ]
-    # outside the picture, even of a wide one: a large lamp on the left, a strip on the right, one above
+    # lamps outside the picture, even if it is wide: a large one on the left, a strip on the right, and one above
     key = {"type": "parallelogram", "base": [-4.6, 0.8, 1.6], "edge0": [1.6, 0, 1.6], "edge1": [0, 2.6, 0]}
     strip = {"type": "parallelogram", "base": [3.6, 0.4, -0.4], "edge0": [0, 2.8, 0], "edge1": [0.3, 0, 0.7]}
     top = {"type": "parallelogram", "base": [-1.3, 4.4, -1.2], "edge0": [2.6, 0, 0], "edge1": [0, 0, 1.6]}

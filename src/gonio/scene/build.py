@@ -1,4 +1,4 @@
-"""Construction of a Mitsuba scene from a validated description."""
+"""Construct a Mitsuba scene from a validated description."""
 
 from __future__ import annotations
 
@@ -29,52 +29,56 @@ from .values import BumpMap, ImageTexture, NormalMap
 if TYPE_CHECKING:
     from ..transport.fast.by_shape import Group
 
-# An error raised by Gonio in a material's plugin; it ends the traceback that Mitsuba reports: kind, where, what, hint.
+# An error raised by Gonio in the plugin of a material, at the end of the traceback that Mitsuba reports: kind, where,
+# what, hint
 _RAISED = re.compile(r"\n(InputError|MachineError): ([^\n]*?): ([^\n]+)\n  hint: ([^\n]+)\Z")
 
-FAR = 4.0  # distance from the origin, in longest sides of a scene, from which it is moved there
-MERGE_FROM = 64  # smallest number of materials of equal structure that are merged into one BSDF
+FAR = 4.0  # distance from the origin, relative to the longest side of the scene, from which a scene is moved there
+MERGE_FROM = 64  # minimum number of materials with equal structure that are merged into one BSDF
 
-# Maps local +z, +x, +y of Mitsuba's sphere, where u runs about z from x toward y and v from +z, to +y, +z, +x of the
-# format, where u runs about y from z toward x and v from +y.
+# Maps the local axes +z, +x, +y of Mitsuba's sphere, where u is the azimuth about z from x toward y and v increases
+# from +z, to +y, +z, +x of the format, where u is the azimuth about y from z toward x and v increases from +y.
 _SPHERE_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
-    """The `mi.Scene` of a description: shapes `shape0`, ..., lights `light0`, ..., and the `sensor` with its film.
+    """Build the `mi.Scene` of a description: shapes `shape0`, ..., lights `light0`, ..., and `sensor` with its film.
 
-    Shapes whose materials are equal share one BSDF. Raises InputError for an unusable image or mesh.
+    Shapes with equal materials share one BSDF. Raises InputError for an unusable image or mesh.
     """
     return built(description, mi, merge_materials=True).scene
 
 
 @dataclass(frozen=True)
 class Built:
-    """A scene, and the BSDF of each material of its description."""
+    """A Mitsuba scene, and the BSDF of each material in its description."""
 
     scene: Scene
     bsdfs: Mapping[MaterialPart, BSDFPlugin]
 
 
 def built(description: schema.SceneDescription, mi: ModuleType, merge_materials: bool = False) -> Built:
-    """The scene, as from `build`, together with the BSDFs, for callers that change them.
+    """Build the scene like `build`, and return it with its BSDFs, for callers that change them.
 
-    merge_materials  whether many materials that differ only in numbers are represented by one BSDF, which is then not
-                     listed in `bsdfs`
+    merge_materials  whether to represent many materials that differ only in numbers by one BSDF, which is not listed in
+                     `bsdfs`
     """
     builder = _Builder(description, mi, merge_materials)
     scene = builder.scene()
     low, high = (np.array(end, float) for end in (scene.bbox().min, scene.bbox().max))
     if np.isfinite([low, high]).all() and np.abs(low + high).max() / 2.0 > FAR * (high - low).max():
-        # what the camera looks at is where details matter
+        # details matter most near the point at which the camera looks
         builder = _Builder(description, mi, merge_materials, np.clip(description.camera.transform.look_at, low, high))
         scene = builder.scene()
     return Built(scene, builder.bsdfs)
 
 
 class _Builder:
-    """Builds a scene whose coordinates are measured from `origin`: rays keep a distance from surfaces that grows with
-    the coordinates, so a scene far from the origin would lose light where objects touch."""
+    """Builds a scene in coordinates relative to `origin`.
+
+    The offset of rays from surfaces is proportional to the coordinates, so a scene far from the origin would lose light
+    where objects touch.
+    """
 
     def __init__(
         self,
@@ -84,7 +88,7 @@ class _Builder:
         origin: np.ndarray | None = None,
     ) -> None:
         from ..bridge import adapter
-        from ..transport.lights import lights  # imported here, since they start Dr.Jit
+        from ..transport.lights import lights  # imported here, because this initializes Dr.Jit
 
         adapter.register(mi)
         self.adapter = adapter
@@ -93,7 +97,7 @@ class _Builder:
         self.origin = np.zeros(3) if origin is None else origin
         self.bsdfs: dict[MaterialPart, BSDFPlugin] = {}
         self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
-        # spectral variants upsample each color separately
+        # only in RGB, because spectral variants upsample each color separately
         self.merge_materials = merge_materials and fast.enabled() and mi.variant().endswith("rgb")
         self.gathered: dict[MaterialPart, tuple[BSDFPlugin, Group, int]] = {}
 
@@ -109,8 +113,8 @@ class _Builder:
             part = self.light(light, pointer("scene", "lights", index), f"light{index}")
             plain = isinstance(light, schema.AreaLight) and isinstance(part, dict)
             (shapes if plain else scene)[f"light{index}"] = part
-        # Mitsuba would merge the meshes of a scene itself, but in random order, which would change the order of the
-        # lights and thus the picture. Therefore they are merged and sorted here.
+        # Mitsuba would merge the meshes of a scene in random order, which would change the order of the lights and thus
+        # the picture. Therefore meshes are merged and sorted here.
         merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
         merged = merged if isinstance(merged, list) else [merged]
         compute_boxes(merged)
@@ -124,11 +128,11 @@ class _Builder:
         return loaded
 
     def load(self, plugin: PluginDict, where: str, optimize: bool = True) -> Plugin:
-        """The Mitsuba object of a dict. Raises InputError at `where` if Mitsuba rejects it."""
+        """Load the Mitsuba object of a dictionary. Raises InputError at `where` if Mitsuba rejects it."""
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", GonioWarning)  # the reader has already warned, with the location
-                # sequentially: in parallel, the order of the objects, and thus the kernels, would be random
+                warnings.simplefilter("ignore", GonioWarning)  # the reader has issued them with the location
+                # sequentially, because the order of the objects, and thus the kernels, would otherwise be random
                 return self.mi.load_dict(plugin, parallel=False, optimize=optimize)
         except InputError as error:
             raise InputError(error.what, self.description.where(where), error.hint) from None
@@ -146,7 +150,7 @@ class _Builder:
             ) from error
 
     def moved(self, point: Sequence[float]) -> list[float]:
-        """A point's coordinates relative to `origin`."""
+        """The coordinates of a point relative to `origin`."""
         return [float(x) for x in np.subtract(point, self.origin)]
 
     def sensor(self) -> PluginDict:
@@ -181,7 +185,7 @@ class _Builder:
 
     def light(self, light: schema.LightSource, where: str, name: str) -> Plugin | PluginDict:
         if isinstance(light, schema.AreaLight):
-            # Mitsuba merges Python plugins whose properties are equal: the tag keeps two equal lamps distinct
+            # Mitsuba merges Python plugins with equal properties; the tag prevents it from merging equal lamps
             emitter = {"type": "gonio_area", "radiance": spectra.emitted(light.energy), "tag": name}
             return self.shape(light.shape, f"{where}/shape", name, emitter)
         if isinstance(light, schema.SpotLight):
@@ -209,7 +213,8 @@ class _Builder:
         matrix = shape.transform.matrix()
         matrix[:3, 3] -= self.origin
         material = shape.material or BY_TYPE["matte"](type="matte")
-        # An object, not a dict: Mitsuba merges equal dicts, and one emitter cannot belong to two shapes.
+        # an object instead of a dictionary, because Mitsuba merges equal dictionaries, and an emitter cannot belong to
+        # two shapes
         source = None if emitter is None else self.load(emitter, where)
         native = self.native_shape(shape, matrix)
         if native is not None and material in self.gathered:
@@ -225,7 +230,7 @@ class _Builder:
         return self.triangles(shape, where).transformed(matrix).to_mitsuba(self.mi, name, bsdf, source)
 
     def native_shape(self, shape: schema.Shape, matrix: np.ndarray) -> PluginDict | None:
-        """Mitsuba's own exact shape; None if it has none."""
+        """The equivalent exact shape of Mitsuba; None if there is none."""
         to_world = np.eye(4)
         if isinstance(shape, schema.Sphere):
             rotation = shape.transform.rotate
@@ -236,7 +241,7 @@ class _Builder:
         if isinstance(shape, schema.Parallelogram):
             edge0, edge1 = matrix[:3, :3] @ shape.edge0, matrix[:3, :3] @ shape.edge1
             normal = np.cross(edge0, edge1)
-            # Mitsuba's rectangle is [-1, 1]^2; it stays exact when its edges are sheared.
+            # Mitsuba's rectangle is [-1, 1]^2; it remains exact if it is sheared.
             to_world[:3, 0], to_world[:3, 1] = edge0 / 2, edge1 / 2
             to_world[:3, 2] = normal / np.linalg.norm(normal)
             to_world[:3, 3] = (matrix @ [*shape.base, 1.0])[:3] + (edge0 + edge1) / 2
@@ -266,7 +271,7 @@ class _Builder:
     def gather(self) -> None:
         """Merge the materials of spheres and parallelograms that differ only in numbers into one BSDF.
 
-        Meshes are excluded, since Mitsuba merges meshes that share a BSDF into one shape.
+        Meshes are excluded, because Mitsuba merges meshes that share a BSDF into one shape.
         """
         places: dict[MaterialPart, str] = {}
         for index, shape in enumerate(self.description.shapes):
@@ -290,15 +295,15 @@ class _Builder:
             try:
                 bsdf = self.load(group.plugin(self.mi), places[members[0]])
             except InputError:
-                continue  # no textures are accepted, or a material is invalid, which is reported when it is built alone
+                continue  # the model takes no textures, or a material is invalid, which is reported when it is built
             if bsdf.placed.model.transmits and bsdf.placed.model.interior is not None:
-                continue  # its index and absorption are also needed away from its shape
+                continue  # its index of refraction and absorption are also needed apart from its shape
             self.gathered |= {member: (bsdf, group, row) for row, member in enumerate(members)}
 
     def plugin(self, material: MaterialPart, where: str) -> PluginDict:
-        """The material as a Mitsuba dict; errors name `where`, as in the methods below."""
+        """A material as a dictionary for Mitsuba; errors name `where`, here and in the following methods."""
         plugin: PluginDict = {"type": self.adapter.register_model(self.mi, material.model)}
-        # As in the lab, back sides are not black; the flag has no effect on materials that transmit light.
+        # As in the lab, the back sides of surfaces are not black; materials that transmit light ignore this flag.
         plugin["two_sided"] = material.two_sided is not False
         if material.preset is not None:
             plugin["preset"] = material.preset
@@ -352,19 +357,19 @@ class _Builder:
         return self.perturbing_normal("normal-map", plugin, slopes(2.0 * pixels - 1.0, texture.scale))
 
     def bumped(self, plugin: PluginDict, texture: BumpMap, where: str) -> PluginDict:
-        """A plugin whose normals follow the slopes of the heights, by central differences; the image repeats."""
+        """A plugin whose normals are computed from the heights by central differences; the image is repeated."""
         heights = texture.scale * self.image(texture, where).mean(axis=2)
         across, down = ((np.roll(heights, -1, axis) - np.roll(heights, 1, axis)) / 2.0 for axis in (1, 0))
         return self.perturbing_normal("bump", plugin, np.dstack([across * heights.shape[1], down * heights.shape[0]]))
 
     def perturbing_normal(self, name: str, plugin: PluginDict, values: np.ndarray) -> PluginDict:
-        """A plugin nested in one that perturbs its normal."""
+        """Nest a plugin in another plugin that perturbs the normal."""
         maps = (textures.bitmap(self.mi, values[..., [axis]], "bilinear", "repeat") for axis in (0, 1))
         perturbed = {"type": self.adapter.plugin_name(name), "base": plugin, "two_sided": plugin["two_sided"]}
         return {**perturbed, **dict(zip(("lean_x", "lean_y"), maps, strict=True))}
 
     def image(self, texture: ImageTexture | NormalMap | BumpMap, where: str) -> RGB:
-        """The values of an image, without its factor."""
+        """The values of an image, without the factor."""
         srgb = isinstance(texture, ImageTexture) and texture.color_space == "srgb"
         channel = texture.channel if isinstance(texture, ImageTexture) else None
         path, inside = self.description.locate(texture.file, f"{where}/file"), documents.inside(texture.file)[1]
@@ -375,7 +380,7 @@ class _Builder:
         return self.images[key]
 
     def values(self, texture: ImageTexture, where: str) -> RGB:
-        """The values of an image times its factor."""
+        """The values of an image, multiplied by the factor."""
         pixels = self.image(texture, where)
         return pixels if texture.factor == 1.0 else pixels * np.asarray(texture.factor, np.float32)
 

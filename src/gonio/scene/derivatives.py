@@ -1,4 +1,4 @@
-"""Values with respect to which a picture can be differentiated: those of a scene's materials, by path in the scene."""
+"""The parameters with respect to which a picture can be differentiated: those of materials, by path in the scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CHANNELS = ("r", "g", "b")
 
 
 def place_of(path: str, where: str) -> tuple[str, str]:
-    """A path in two parts: ("shapes.0.material", "base.alpha") for "shapes.0.material.base.alpha".
+    """Split "shapes.0.material.base.alpha" into ("shapes.0.material", "base.alpha").
 
     where  the location that errors name
     """
@@ -24,7 +24,10 @@ def place_of(path: str, where: str) -> tuple[str, str]:
 
 
 def material_at(description: SceneDescription, built: Built, place: str, where: str) -> BSDFPlugin:
-    """The plugin of the material at the path `place`. Raises InputError, which names `where`, if it is not Gonio's."""
+    """The plugin of the material at the path `place`.
+
+    Raises InputError, which names `where`, if the material is not one of Gonio's.
+    """
     index = int(place.split(".")[1])
     if index >= len(description.shapes):
         raise InputError(f"no shape {index}", where, f"the scene has {len(description.shapes)}")
@@ -36,8 +39,10 @@ def material_at(description: SceneDescription, built: Built, place: str, where: 
 
 
 def along(description: SceneDescription, built: Built, path: str) -> Along:
-    """The variable named by a path such as "shapes.0.material.alpha" or "shapes.0.material.albedo.r". Raises InputError
-    for values without derivatives."""
+    """The variable given by a path such as "shapes.0.material.alpha" or "shapes.0.material.albedo.r".
+
+    Raises InputError for parameters without derivatives.
+    """
     where = f"gradient: {path}"
     place, parameter = place_of(path, where)
     plugin = material_at(description, built, place, where)

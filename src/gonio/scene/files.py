@@ -1,4 +1,4 @@
-"""Locate the files that a scene names."""
+"""Locate the files named by a scene."""
 
 from __future__ import annotations
 
@@ -10,28 +10,29 @@ from ..errors import InputError, did_you_mean
 
 
 def located(file: str, folder: Path, where: str, allow_outside: bool = False) -> Path:
-    """The path of a file named by a file in `folder`. Raises InputError if it is missing or outside that folder.
+    """The path of a file that a file in `folder` names. Raises InputError if it is missing or outside the folder.
 
     where          the location that errors name
-    allow_outside  allow files outside the folder
+    allow_outside  whether files outside the folder are allowed
     """
     file = documents.inside(file)[0]
     return checked(Path(folder, file), file, folder, where, allow_outside)
 
 
 def checked(file: Path, name: str, folder: Path, where: str, allow_outside: bool = False) -> Path:
-    """The path of a file with links resolved. Raises InputError if it is missing, empty or outside the folder.
+    """The path of a file, with symbolic links resolved. Raises InputError if it is missing, empty or outside the
+    folder.
 
-    name           the file's name in errors
+    name           name of the file in errors
     where          the location that errors name
-    allow_outside  allow files outside the folder
+    allow_outside  whether files outside the folder are allowed
     """
     try:
         folder = folder.resolve()
-        path = file.resolve()  # follows symbolic links, so that they cannot lead outside
+        path = file.resolve()  # resolves symbolic links, which must not lead outside
         exists, regular = path.exists(), path.is_file()
         empty = regular and path.stat().st_size == 0
-    except (OSError, ValueError, RuntimeError) as error:  # the name is too long, has a NUL byte, or links form a loop
+    except (OSError, ValueError, RuntimeError) as error:  # too long a name, a zero byte, or circular links
         raise InputError(f"no usable file name: {error}", where, "give a file beside the scene") from None
     if not allow_outside and not path.is_relative_to(folder):
         raise InputError(
@@ -49,5 +50,5 @@ def checked(file: Path, name: str, folder: Path, where: str, allow_outside: bool
 
 
 def _siblings(path: Path, most: int = 200) -> list[Path]:
-    """Other files in the same folder, for a hint."""
+    """Other files in the same folder, for the hint of an error."""
     return [p for p in islice(path.parent.iterdir(), most) if p.is_file()] if path.parent.is_dir() else []

@@ -6,14 +6,14 @@ import os
 
 from ..errors import InputError
 
-# An estimate per pixel: 9 sums in float64, twice (before and after a pass), the lane order, the picture as float64 and
-# float32, and the bytes of the file.
+# An estimate per pixel: 9 sums in float64, twice (before and after a pass), the order of the lanes, the picture as
+# float64 and float32, and the bytes of the file.
 BYTES_PER_PIXEL = 250
-MAX_SIDE = 1 << 16  # pixels
+MAX_SIDE = 1 << 16  # maximum number of pixels along a side
 
 
 def check_film(size: tuple[int, int], where: str) -> None:
-    """Raise InputError, which names `where`, for a film without pixels or one too large for this machine's memory."""
+    """Raise InputError, which names `where`, if a film has no pixels or is too large for the memory of this machine."""
     width, height = size
     if width < 1 or height < 1:
         raise InputError(f"a film of {width}x{height} has no pixels", where, "give 1x1 or more")
@@ -28,7 +28,7 @@ def check_film(size: tuple[int, int], where: str) -> None:
 
 
 def memory() -> int:
-    """Bytes of memory in this machine; 8 GiB if the system does not report them."""
+    """The size of this machine's memory in bytes; 8 GiB if the system does not report it."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):

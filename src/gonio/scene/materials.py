@@ -1,9 +1,10 @@
 """The materials of scene files, derived from the parameters that each model declares.
 
-Two families share the `type` key. The lab's six types have the lab's keys, meaning and defaults (`LAB`). Every model of
-Gonio is available with its own parameters and defaults, as `gonio-conductor`, and without the prefix unless the lab
-uses that name. New models need no change here, nor do materials that are registered later, nor classes in a Python file
-in the scene's folder ("ward.py:Ward"), which are executed only if code is allowed.
+There are two groups of types. The lab's six types have the keys, meanings and defaults of the lab (`LAB`). In addition,
+every model of Gonio is available with its own parameters and defaults under a name such as `gonio-conductor`, and
+without the prefix unless the lab uses this name. New models require no change here. Neither do materials that are
+registered later, nor classes in a Python file in the scene's folder, such as "ward.py:Ward", which are executed only if
+code is allowed.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ Model = type[BSDF]
 Locate: TypeAlias = Callable[[str, str], Path]
 T = TypeVar("T")
 
-# The possible values of a parameter in a scene file
+# the possible values of a parameter in a scene file
 Value: TypeAlias = "float | bool | str | ImageTexture | MaterialPart | tuple[float | ImageTexture, ...]"
 
 
@@ -69,8 +70,8 @@ Value: TypeAlias = "float | bool | str | ImageTexture | MaterialPart | tuple[flo
 class LabType:
     """The mapping of a type of the lab's format to a model.
 
-    renamed   the lab's key -> the parameter that it sets, with the value unchanged
-    defaults  parameters whose default in the lab differs from the model's
+    renamed   keys of the lab -> parameters that they set, with unchanged values
+    defaults  parameters whose default in the lab differs from that of the model
     required  keys that the lab requires
     ignored   keys that are accepted but have no effect
     """
@@ -87,20 +88,20 @@ _LAB_MICROFACETS = {"ndf": "beckmann", "masking": "smith-separable", "fresnel": 
 LAB = {
     "matte": LabType("lambert", "Ideal diffuse reflection.", defaults={"albedo": 0.5}),
     "mirror": LabType("mirror", "Ideal mirror; its reflectance is 1, regardless of `albedo`.", ignored=("albedo",)),
-    "phong": LabType("phong", "kd cos_i + ks (v.r)^p, as the lab sheet's eq. 1.", required=("p",)),
+    "phong": LabType("phong", "kd cos_i + ks (v.r)^p, as in eq. 1 of the lab sheet.", required=("p",)),
     "oren-nayar": LabType(
-        "oren-nayar", "Oren-Nayar; `roughness` is sigma itself.", {"roughness": "sigma"}, required=("roughness",)
+        "oren-nayar", "Oren-Nayar, with sigma = `roughness`.", {"roughness": "sigma"}, required=("roughness",)
     ),
     "conductor": LabType(
         "conductor",
-        "Rough metal; `roughness` is alpha itself, not squared. Beckmann, separable Smith, Schlick unless said.",
+        "Rough metal, with alpha = `roughness`. The default terms are Beckmann, separable Smith and Schlick.",
         {"roughness": "alpha"},
         _LAB_MICROFACETS,
         required=("roughness",),
     ),
     "dielectric": LabType(
         "dielectric",
-        "Rough glass; `roughness` is alpha itself, not squared. Beckmann, separable Smith, Schlick unless said.",
+        "Rough glass, with alpha = `roughness`. The default terms are Beckmann, separable Smith and Schlick.",
         {"roughness": "alpha"},
         _LAB_MICROFACETS,
         required=("roughness",),
@@ -109,7 +110,10 @@ LAB = {
 
 
 class Argument(NamedTuple):
-    """A parameter's value in a scene, and its key in the file; if `squared`, the parameter is the square of `value`."""
+    """The value of a parameter in a scene, and its key in the file.
+
+    squared  whether the parameter is the square of the value
+    """
 
     value: Value
     key: str
@@ -127,23 +131,23 @@ class MaterialPart(Part):
     two_sided: Annotated[bool, Strict()] | None = None
     """Whether both sides reflect in the same way. The default is true for all materials that transmit no light."""
 
-    _given: bool = PrivateAttr(False)  # whether a program made it; paths of files are then used unchanged
+    _given: bool = PrivateAttr(False)  # whether a program created it; file paths are then used unchanged
     _source: str = PrivateAttr("")  # the document that contains the material
-    _notices: tuple[str, ...] = PrivateAttr(())  # what could not be converted from that document
+    _notices: tuple[str, ...] = PrivateAttr(())  # features of the document that could not be converted
     model: ClassVar[Model]
     declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter that it sets
     dials: ClassVar[dict[str, str]]  # key of a perceptual roughness -> the parameter alpha whose square root it is
     lab: ClassVar[LabType | None]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle by the name of the type, since the classes are created at run time and belong to no module."""
+        """Pickle by the name of the type, because the classes are created at run time and belong to no module."""
         return _pickled, (self.type, self.model, dict(self.__dict__), set(self.model_fields_set))
 
     def get(self, key: str) -> Value | None:
         return getattr(self, _attribute(key))
 
     def arguments(self) -> dict[str, Argument]:
-        """Parameter name -> value, for all values that the file gives or the lab fixes."""
+        """The values that the file gives or the lab defines, by the name of the parameter."""
         arguments: dict[str, Argument] = {}
         if self.lab:
             arguments.update({name: Argument(value, name) for name, value in self.lab.defaults.items()})
@@ -161,8 +165,11 @@ class MaterialPart(Part):
         return preset
 
     def code(self) -> list[Path]:
-        """The user's Python files that the material runs: its own, those of its distribution, masking term, ..., and
-        the modules that these import from their folders."""
+        """The user's Python files that the material executes.
+
+        These are the files of its class, distribution, masking term and so on, and the modules that they import from
+        their folders.
+        """
         texts = [inspect.getsourcefile(self.model) or ""] if outside.is_outside(self.model) else []
         for name, (value, _, _) in self.arguments().items():
             parameter = self.model.parameters()[name]
@@ -172,17 +179,17 @@ class MaterialPart(Part):
         return [file for text in texts for file in outside.with_imports(Path(text))]
 
     def located(self, file: str, locate: Locate | None, pointer: str) -> str:
-        """The path of a file parameter. A scene's files must lie in its folder unless files outside are allowed."""
+        """The path of a file that is a parameter. It must be in the scene's folder unless outside files are allowed."""
         path, item = parted(file)
         if not self._given and locate is not None and path != SAMPLE:
             path = str(locate(path, pointer))
         return f"{path}:{item}" if item else path
 
     def instance(self, locate: Locate | None = None, where: str = "") -> BSDF:
-        """The model with this material's values; a textured parameter has its default.
+        """The model with the values of this material, in which textured parameters have their defaults.
 
-        locate  function that returns the path of a file, given its name in the scene and a JSON pointer
-        where   JSON pointer of this material
+        locate  a function that returns the path of a file, given its name in the scene and a JSON pointer
+        where   JSON pointer to this material
         Raises InputError for combinations that the model rejects, such as two-sided glass.
         """
         parameters = self.model.parameters()
@@ -201,13 +208,13 @@ class MaterialPart(Part):
             if parameter.required and name not in values:
                 values[name] = min(max(0.5, parameter.low), parameter.high)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", GonioWarning)  # `reader` warns itself, with the location in the file
+            warnings.simplefilter("ignore", GonioWarning)  # `reader` issues them with the location in the file
             return self.model(**values)
 
     @classmethod
     @functools.cache
     def _spellings(cls) -> dict[str, list[str]]:
-        """Parameter name -> the keys that set it."""
+        """The keys that set each parameter, by the name of the parameter."""
         spellings: dict[str, list[str]] = {}
         for key, parameter in cls.declared.items():
             spellings.setdefault(parameter.name, []).append(key)
@@ -246,7 +253,7 @@ class MaterialPart(Part):
 
 
 def _attribute(key: str) -> str:
-    # The prefix keeps a parameter from hiding a method of pydantic (`copy`, `json`) or of this class.
+    # The prefix prevents a parameter from hiding a method of pydantic (`copy`, `json`) or of this class.
     return f"value_{key}"
 
 
@@ -290,7 +297,7 @@ def _in_range(parameter: Parameter, key: str) -> Callable[[T], T]:
 
 
 def _chosen(parameter: ChoiceParameter, key: str) -> Callable[[object, ValidationInfo], str]:
-    """A validator of names, including members that were registered later, and FILE.py:CLASS if code is allowed."""
+    """A validator of names, which accepts members that were registered later, and FILE.py:CLASS if code is allowed."""
 
     def check(value: object, info: ValidationInfo) -> str:
         if isinstance(value, str) and parameter.family is not None and outside.names_code(value):
@@ -343,7 +350,7 @@ def _field(parameter: Parameter, key: str, required: bool, doc: str = "") -> tup
         of_kind = Index if isinstance(parameter, IndexParameter) else _KINDS[parameter.kind]
         kind = Annotated[of_kind, AfterValidator(_in_range(parameter, key))]
     doc = doc or f"{parameter.doc} ({parameter.range})"
-    # JSON Schema applies minimum and maximum to numbers only, so they do not affect lists and textures.
+    # JSON Schema applies minimum and maximum only to numbers, so they do not affect lists and textures.
     limits = {"minimum": parameter.low, "maximum": math.inf if parameter.soft_high else parameter.high}
     extra: dict[str, Any] = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
     if required:
@@ -367,7 +374,7 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
             dial = name.replace("alpha", "roughness")
             if parameter.kind == "alpha" and dial not in parameters:
                 dials[dial] = name
-                docs[dial] = f"The artist's parameter in place of {name}: {name} = {dial}^2. Giving both is an error."
+                docs[dial] = f"The artist's parameter instead of {name}: {name} = {dial}^2. Giving both is an error."
     fields: dict[str, Any] = {"type": (Literal[names], Field(description=lab.doc if lab else _summary(model)))}
     for key, parameter in declared.items():
         # `_one_spelling` checks the keys of the lab that have a second spelling.
@@ -376,12 +383,12 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
     for dial, name in dials.items():
         fields[_attribute(dial)] = _field(parameters[name], dial, False, docs[dial])
     for key in lab.ignored if lab else ():
-        fields[_attribute(key)] = (Colour | None, Field(None, alias=key, description="Accepted and ignored."))
+        fields[_attribute(key)] = (Colour | None, Field(None, alias=key, description="This key has no effect."))
     if model.presets():
-        doc = f'Named values in place of the numbers, e.g. "{next(iter(model.presets()))}".'
+        doc = f'Name of a preset, whose values replace the numbers, e.g. "{next(iter(model.presets()))}".'
         fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
     if model.spelling:
-        fields[_attribute("file")] = (str | None, Field(None, alias="file", description="The shader."))
+        fields[_attribute("file")] = (str | None, Field(None, alias="file", description="The shader file."))
     title = "".join(word.capitalize() for word in names[0].split("-"))
     doc = lab.doc if lab else _summary(model)
     cls = create_model(title, __base__=MaterialPart, __doc__=doc, **fields)
@@ -394,13 +401,18 @@ def _summary(model: type[BSDF]) -> str:
 
 
 def _spellings(name: str) -> tuple[str, ...]:
-    """A model's names in a scene, with hyphens or underscores; without the prefix unless the lab uses that name."""
+    """The names of a model in a scene, with hyphens or underscores, and without the prefix unless the lab uses the
+    name.
+    """
     plain = () if name in LAB else (name,)
     return tuple(dict.fromkeys(s for n in (*plain, f"gonio-{name}") for s in (n, n.replace("-", "_"))))
 
 
 class _Declared(Mapping[str, type[MaterialPart]]):
-    """The class of each type by its names in a scene, created on first access, since creating all takes a second."""
+    """The class of each type, by its names in a scene.
+
+    The classes are created on first access, because creating all of them takes a second.
+    """
 
     def __init__(self) -> None:
         known = models()
@@ -427,7 +439,7 @@ class _Declared(Mapping[str, type[MaterialPart]]):
 
 
 BY_TYPE = _Declared()
-OWN = "FILE.py:CLASS"  # tag of Gonio's materials; materials in other programs' files have the name of the format
+OWN = "FILE.py:CLASS"  # tag of Gonio's materials; the tag of materials in other programs' files is the format's name
 
 
 @functools.cache
@@ -448,7 +460,7 @@ def part_of(name: str) -> type[MaterialPart] | None:
 
 
 def described(material: BSDF) -> MaterialPart:
-    """The scene's representation of a material object."""
+    """The representation of a material object in a scene."""
     cls: Any = type(material)
     name = f"gonio-{material.name}"
     if cls.spelling:
@@ -489,11 +501,11 @@ class DocumentPart(Part):
     material: Annotated[str, Strict()] | None = None
     """The material in the file, by name, or by number if it has no name; not needed if there is only one."""
     two_sided: Annotated[bool, Strict()] | None = None
-    """Whether both sides reflect alike, as for any material."""
+    """Whether both sides reflect in the same way, as for any material."""
 
 
 def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> MaterialPart:
-    """The material that a `DocumentPart` refers to."""
+    """The material to which a `DocumentPart` refers."""
     if isinstance(part, MaterialPart):
         return part
     context = info.context or {}
@@ -516,7 +528,7 @@ def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> M
 
 
 def _relative_to_scene(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
-    """A material's notation, with the paths of its files relative to the scene's folder."""
+    """The notation of a material, with file paths relative to the scene's folder."""
     relative: dict[str, object] = {}
     for key, value in notation.items():
         if key == "file":
@@ -534,7 +546,7 @@ def _tag(value: object) -> str | None:
 
 
 def _own(value: object, info: ValidationInfo) -> MaterialPart:
-    """A material by its type: one of Gonio's, a named or registered one, or, if code is allowed, one from a file."""
+    """The material of a given type: one of Gonio's, of the library, registered, or, if code is allowed, from a file."""
     if isinstance(value, MaterialPart):
         return value
     if not isinstance(value, dict):
@@ -562,7 +574,7 @@ def _own(value: object, info: ValidationInfo) -> MaterialPart:
 
 
 def _from_shader(value: dict[str, Any], context: dict[str, Any]) -> MaterialPart:
-    """A shader in the scene's folder, which cannot run code on the machine."""
+    """A material from a shader in the scene's folder. Shaders cannot execute native code."""
     file = value.get("file")
     if not isinstance(file, str) or not file:
         raise invalid("a shader needs a 'file'", 'such as {"type": "shader", "file": "my.glsl"}', "file")
@@ -579,7 +591,7 @@ def _from_shader(value: dict[str, Any], context: dict[str, Any]) -> MaterialPart
 
 
 def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> MaterialPart:
-    """A material of the library by name, as its model with a preset."""
+    """A material of the library, as its model with a preset."""
     try:
         model, preset = library.named(name)
     except InputError as error:
@@ -587,7 +599,7 @@ def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> 
     return BY_TYPE[model.name].model_validate({**value, "type": model.name, "preset": preset}, context=context)
 
 
-# Placeholder for any of Gonio's materials in a generated schema, since there are many and they can be nested.
+# a placeholder for all of Gonio's materials in a generated schema, because there are many and they can be nested
 PLACEHOLDER = {"$comment": "any material"}
 
 if TYPE_CHECKING:
@@ -601,9 +613,9 @@ else:
 
 
 def any_material(references: Iterable[dict[str, str]]) -> dict[str, Any]:
-    """The schema of any material, given references to the schemas of Gonio's."""
+    """The schema of any material, given references to the schemas of Gonio's materials."""
     pattern = {"type": {"type": "string", "pattern": _CODE}}
-    own = {"type": "object", "properties": pattern, "required": ["type"], "description": "A class in a file."}
+    own = {"type": "object", "properties": pattern, "required": ["type"], "description": "A class in a Python file."}
     properties = {"type": {"const": SHADER}, "file": {"type": "string", "minLength": 1}}
     shader = {"type": "object", "properties": properties, "required": ["type", "file"], "description": "A shader."}
     return {"oneOf": [*references, own, shader]}

@@ -1,9 +1,9 @@
-"""Triangle meshes: shapes that Mitsuba lacks, and mesh files.
+"""Triangle meshes: shapes that Mitsuba does not have, and mesh files.
 
-Disk, cone and cylinder are tessellated with exact normals and texture coordinates at the vertices. A full turn has
-`SEGMENTS` = 1024 segments. Points lie up to radius * (1 - cos(pi/1024)) = 4.7e-6 radius inside the true surface. The
-direction of dp/du, constant within a segment, has an error of up to pi/1024 = 0.18 degrees, as have normals near a
-cone's apex; u has an error of up to half a segment, 1/2048, near the center of a disk and the apex of a cone.
+Disks, cones and cylinders are tessellated, with exact normals and texture coordinates at the vertices. A full turn has
+`SEGMENTS` = 1024 segments, so points are up to radius * (1 - cos(pi/1024)) = 4.7e-6 radius inside the true surface. The
+direction of dp/du is constant within a segment and has an error of up to pi/1024 = 0.18 degrees, as have normals near
+the apex of a cone. Near the center of a disk and the apex of a cone, u has an error of up to half a segment, 1/2048.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ PlyProperties: TypeAlias = list[tuple[str, ...]]  # (type, name), or ("list", ty
 PlyTable: TypeAlias = dict[str, np.ndarray | list[list[int]]]  # columns by name; columns of lists are lists of lists
 
 SEGMENTS = 1024
-MAX_BYTES = 2**30  # of a mesh file
+MAX_BYTES = 2**30  # maximum size of a mesh file
 
 
 @dataclass(frozen=True)
 class Triangles:
-    """A mesh: vertices (N, 3), faces (M, 3) of vertex indices; normals (N, 3) and uv (N, 2) per vertex, or None."""
+    """A mesh: vertices (N, 3), faces (M, 3) as vertex indices, and normals (N, 3) and uv (N, 2) per vertex, or None."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -38,7 +38,7 @@ class Triangles:
     uv: np.ndarray | None = None
 
     def transformed(self, matrix: np.ndarray) -> Triangles:
-        """The mesh transformed by a 4x4 matrix. A reflection reverses the faces, so that normals stay outward."""
+        """The mesh transformed by a 4x4 matrix. A reflection reverses the faces, so normals remain outward."""
         linear = matrix[:3, :3]
         normals = None
         if self.normals is not None:
@@ -51,7 +51,7 @@ class Triangles:
         )
 
     def to_mitsuba(self, mi: ModuleType, name: str, bsdf: BSDFPlugin, emitter: Emitter | None = None) -> Shape:
-        """A `mi.Mesh` with that BSDF and, if given, that emitter."""
+        """A `mi.Mesh` with the given BSDF and, optionally, an emitter."""
         properties = mi.Properties()
         properties["bsdf"] = bsdf
         if emitter is not None:
@@ -84,28 +84,33 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def disk(radius: float, inner_radius: float, phi_max: float) -> Triangles:
-    """A disk in z = 0 with normal +z; u = phi / phi_max, v = 0 at the rim and 1 at the center."""
+    """A disk in the plane z = 0 with the normal +z; u = phi / phi_max, and v is 0 at the edge and 1 at the center."""
     return _revolved(
         phi_max, rings=[(radius, 0.0, 0.0), (inner_radius, 0.0, 1.0 - inner_radius / radius)], slope=(0.0, 1.0)
     )
 
 
 def cylinder(radius: float, height: float, phi_max: float) -> Triangles:
-    """A cylinder from z = 0 to z = height, open at both ends, with normals outward; v = z / height."""
+    """A cylinder from z = 0 to z = height, open at both ends, with outward normals; v = z / height."""
     return _revolved(phi_max, rings=[(radius, 0.0, 0.0), (radius, height, 1.0)], slope=(1.0, 0.0))
 
 
 def cone(radius: float, height: float, phi_max: float) -> Triangles:
-    """A cone with its base in z = 0 and its apex at z = height, open below, with normals outward; v = z / height."""
+    """A cone with its base in the plane z = 0 and its apex at z = height, without the base disk; v = z / height.
+
+    The normals point outward.
+    """
     length = math.hypot(radius, height)
     return _revolved(phi_max, rings=[(radius, 0.0, 0.0), (0.0, height, 1.0)], slope=(height / length, radius / length))
 
 
 def _revolved(phi_max: float, rings: list[tuple[float, float, float]], slope: tuple[float, float]) -> Triangles:
-    """The band between two rings (radius, z, v) about z. `slope` has the normal's components along the radius and z.
+    """The band between two rings (radius, z, v) about the z axis.
 
-    A ring of radius 0, where u is undefined, gets one vertex per segment, at the middle angle of the segment, so that
+    On a ring of radius 0, where u is undefined, there is one vertex per segment, at the middle angle of the segment, so
     dp/du of each triangle has the direction of its chord.
+
+    slope  components of the normal along the radius and along z
     """
     count = max(3, math.ceil(SEGMENTS * phi_max / (2 * math.pi)))
     edges = np.linspace(0.0, 1.0, count + 1)
@@ -132,7 +137,7 @@ def _revolved(phi_max: float, rings: list[tuple[float, float, float]], slope: tu
 
 
 def cube() -> Triangles:
-    """The cube [-1, 1]^3 with normals outward. On faces normal to axis i, u runs along axis i + 1 and v along i + 2."""
+    """The cube [-1, 1]^3 with outward normals. On faces normal to axis i, u is along axis i + 1 and v along i + 2."""
     vertices: list[np.ndarray] = []
     normals: list[np.ndarray] = []
     faces: list[list[int]] = []
@@ -166,10 +171,10 @@ def is_ply(path: Path) -> bool:
 
 
 def read_mesh(path: Path, where: str, kind: str = "") -> Triangles:
-    """The triangles of an .obj or .ply file. Raises InputError, with the line if the format has lines.
+    """Read the triangles of an .obj or .ply file. Raises InputError, with the line if the format has lines.
 
-    where  the location in the scene that errors name
-    kind   suffix of the format, instead of the path's own
+    where  location in the scene, for errors
+    kind   suffix of the format, if it differs from that of the path
     """
     readers = {".obj": read_obj, ".ply": read_ply}
     kind = kind or path.suffix.lower()
@@ -193,7 +198,7 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
     if len(mesh.faces) == 0:
         raise InputError(f"'{path.name}' has no faces", where, "export it with triangles or polygons")
     for name, values in (("vertex", mesh.vertices), ("normal", mesh.normals), ("texture coordinate", mesh.uv)):
-        if values is not None and not np.all(np.abs(values) < 1e18):  # NaN compares false
+        if values is not None and not np.all(np.abs(values) < 1e18):  # false for NaN
             row = int(np.argmin(np.all(np.abs(values) < 1e18, axis=1)))
             raise InputError(
                 f"'{path.name}': a {name} is not finite: {values[row].tolist()}", where, "export the mesh again"
@@ -215,7 +220,7 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
     normals = mesh.normals
     if normals is not None:
         short = np.linalg.norm(normals, axis=1) < 1e-12
-        if short.any():  # some exporters write 0 0 0; the adjacent faces give the normal there
+        if short.any():  # some exporters write 0 0 0; these normals are computed from the adjacent faces
             face_normals = np.zeros_like(normals)
             np.add.at(face_normals, faces.ravel(), np.repeat(crossed, 3, axis=0))
             normals = np.where(short[:, None], face_normals, normals)
@@ -224,8 +229,10 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
 
 
 def read_obj(data: bytes, path: Path, where: str) -> Triangles:
-    """The triangles of Wavefront OBJ data, from its lines v, vt, vn and f. Polygons become fans, and negative indices
-    count from the end. Errors name `path` and `where`."""
+    """Read the triangles of Wavefront OBJ data, from the lines v, vt, vn and f. Errors name `path` and `where`.
+
+    Polygons are divided into triangle fans; negative indices count from the end.
+    """
     columns: dict[bytes, list[list[float]]] = {b"v": [], b"vt": [], b"vn": []}
     corners: list[tuple[int, int, int]] = []
     needed = {b"v": 3, b"vt": 2, b"vn": 3}
@@ -272,7 +279,7 @@ def read_obj(data: bytes, path: Path, where: str) -> Triangles:
                 corners += [polygon[0], second, third]
     if not corners:
         raise InputError(f"'{path.name}' has no faces", where, "is it an OBJ file? expected lines like: f 1 2 3")
-    # Each distinct combination of position, uv and normal is one vertex.
+    # Each distinct combination of position, uv and normal becomes one vertex.
     combined, faces = np.unique(np.array(corners), axis=0, return_inverse=True)
     arrays = {key: np.array(rows, dtype=float).reshape(-1, needed[key]) for key, rows in columns.items()}
     has_uv, has_normals = (combined[:, 1] >= 0).all(), (combined[:, 2] >= 0).all()
@@ -296,9 +303,9 @@ _PLY_TYPES = {
 
 
 def read_ply(data: bytes, path: Path, where: str) -> Triangles:
-    """The triangles of Stanford PLY data, ASCII or binary; errors name `path` and `where`.
+    """Read the triangles of Stanford PLY data, ASCII or binary. Errors name `path` and `where`.
 
-    Reads the elements vertex, with x y z [nx ny nz] [u v | s t | texture_u texture_v], and face, with index lists.
+    Two elements are read: vertex, with x y z [nx ny nz] [u v | s t | texture_u texture_v], and face, with index lists.
     """
 
     def refuse(what: str, hint: str = "export the mesh again") -> NoReturn:
@@ -353,13 +360,13 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
 
 
 class _Refuse(Protocol):
-    """Raises InputError."""
+    """The type of functions that raise InputError."""
 
     def __call__(self, what: str, hint: str = "") -> NoReturn: ...
 
 
 def _ply_header(header: bytes, refuse: _Refuse) -> tuple[str, list[tuple[str, int, PlyProperties]]]:
-    """The byte order ("ascii", "<" or ">") and the elements: name, count, properties."""
+    """The byte order ("ascii", "<" or ">"), and the name, count and properties of each element."""
     order = ""
     elements: list[tuple[str, int, PlyProperties]] = []
     for line in header.decode("ascii", "replace").splitlines()[1:]:
@@ -384,7 +391,7 @@ def _ply_header(header: bytes, refuse: _Refuse) -> tuple[str, list[tuple[str, in
 
 
 def _ply_ascii(words: list[bytes], count: int, properties: PlyProperties) -> tuple[PlyTable, list[bytes]]:
-    if count > len(words) + 1:  # so that a wrong count in the header allocates nothing
+    if count > len(words) + 1:  # checked before allocation, because the count in the header may be wrong
         raise ValueError
     numbers: dict[str, list[float]] = {p[-1]: [] for p in properties if p[0] != "list"}
     lists: dict[str, list[list[int]]] = {p[-1]: [] for p in properties if p[0] == "list"}
@@ -404,7 +411,7 @@ def _ply_ascii(words: list[bytes], count: int, properties: PlyProperties) -> tup
 
 
 def _ply_binary(body: memoryview, count: int, properties: PlyProperties, order: str) -> tuple[PlyTable, memoryview]:
-    if count > len(body):  # so that a wrong count in the header allocates nothing
+    if count > len(body):  # checked before allocation, because the count in the header may be wrong
         raise ValueError
     if not any(p[0] == "list" for p in properties):
         row = np.dtype([(name, order + _PLY_TYPES[kind]) for kind, name in properties])
@@ -437,7 +444,7 @@ def _ply_binary(body: memoryview, count: int, properties: PlyProperties, order: 
 def _ply_triangles(
     body: memoryview, count: int, properties: PlyProperties, order: str
 ) -> tuple[PlyTable, memoryview] | None:
-    """The usual case, a single list of triangles only, read without a loop; None in other cases."""
+    """Read the faces without a loop in the usual case, a single list of triangles; returns None in other cases."""
     if len(properties) != 1:
         return None
     _, counter, item, name = properties[0]

@@ -1,4 +1,4 @@
-"""Load Mitsuba XML files, scenes and single BSDFs, with the same checks as for the lab's scenes."""
+"""Load Mitsuba XML files of scenes and single BSDFs, with the same checks as for the lab's scenes."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from .mitsuba_xml import SceneText
 def read(
     file: Path, parameters: Mapping[str, object], allow_outside: bool = False, allow_code: bool = False
 ) -> SceneText:
-    """The text of a Mitsuba XML file; see `mitsuba_xml.read`.
+    """Read a Mitsuba XML file, see `mitsuba_xml.read`.
 
-    parameters     values of its `$parameters`: strings, numbers or lists of numbers
-    allow_outside  allow the scene to name files outside its folder
-    allow_code     allow the scene to load native plugins from the folder `plugins` next to it
+    parameters     values of the `$parameters`: strings, numbers or lists of numbers
+    allow_outside  whether the scene may name files outside its folder
+    allow_code     whether the scene may load native plugins from the folder `plugins` next to it
     """
     values = {key: _as_xml(value) for key, value in parameters.items()}
     return mitsuba_xml.read(file, values, allow_outside, allow_code)
@@ -38,9 +38,9 @@ def load(
     size: tuple[int, int] | None = None,
     own_integrator: bool = True,
 ) -> Scene:
-    """The scene of a Mitsuba XML file, given its text as returned by `read`.
+    """Load the scene of a Mitsuba XML file, given its text as returned by `read`.
 
-    size            size of the film in pixels; None keeps the scene's
+    size            size of the film in pixels; None uses that of the scene
     own_integrator  whether the scene must name an integrator
     Raises InputError if Mitsuba rejects the scene.
     """
@@ -67,10 +67,10 @@ def load(
 
 @contextlib.contextmanager
 def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
-    """Turn errors that a scene causes during rendering into InputErrors with Mitsuba's text.
+    """Convert errors that a scene causes during rendering to InputErrors with Mitsuba's text.
 
     own_integrator  whether the scene is rendered by its own integrator. If so, every error that was not raised by one
-                    of Gonio's materials is attributed to Mitsuba; otherwise, only errors raised by plugins, such as
+                    of Gonio's materials is attributed to Mitsuba; otherwise, only errors raised by plugins are, such as
                     "[Texture] eval_1_grad(): not implemented!"
     """
     try:
@@ -89,10 +89,9 @@ def rendering(file: Path, own_integrator: bool) -> Iterator[None]:
 
 
 def load_bsdf(path: Path) -> MitsubaBSDF:
-    """The BSDF of a Mitsuba XML file: its root, or the first BSDF of a scene. The file may
-    refer to other files in the same folder.
+    """Load the BSDF of a Mitsuba XML file, which is the root element or the first BSDF of a scene.
 
-    Raises InputError if there is none.
+    The file may refer to other files in the same folder. Raises InputError if there is no BSDF.
     """
     mi = foreign.mitsuba()
     with _without_options():
@@ -111,8 +110,10 @@ def load_bsdf(path: Path) -> MitsubaBSDF:
 
 
 def within(description: PluginDict, file: Path) -> PluginDict:
-    """A description given in a file, with absolute paths of the files that it names; these must lie in that file's
-    folder."""
+    """A description from a file, in which the names of other files are replaced by absolute paths.
+
+    These files must be in the folder of the file.
+    """
 
     def locate(name: str) -> str:
         return mitsuba_xml.readable(name, file.parent / name, file.parent, str(file))
@@ -130,7 +131,7 @@ def within(description: PluginDict, file: Path) -> PluginDict:
 
 @contextlib.contextmanager
 def _without_options() -> Iterator[None]:
-    """Inside the block, remove the hint about `--allow-outside`, an option for scenes, from errors."""
+    """Inside the `with` block, remove the hint about `--allow-outside`, an option for scenes, from errors."""
     try:
         yield
     except InputError as error:
@@ -138,10 +139,11 @@ def _without_options() -> Iterator[None]:
 
 
 def instantiated(text: SceneText, folder: Path, mi: ModuleType) -> Plugin:
-    """The Mitsuba object that a scene's text describes. Raises Mitsuba's own errors."""
+    """The Mitsuba object that the text of a scene describes. Raises Mitsuba's own errors."""
     allowed = [folder.resolve()] if text.runs_code else []
-    # Sequentially and without merging, since otherwise the order of shapes, and thus the last bits, would be random.
-    # In parallel, an unreadable file would also abort the process, since the error is raised in another thread.
+    # Objects are loaded sequentially and without merging; otherwise the order of the shapes, and thus the last bits of
+    # the picture, would be random. In addition, an unreadable file would abort the process if it were loaded in
+    # parallel, because the error would be raised in another thread.
     with file_threads(), plugin_search.searching(mi, *allowed):
         return mi.load_string(text.text, parallel=False, optimize=False)
 
@@ -151,11 +153,11 @@ def _as_xml(value: object) -> str:
 
 
 def _mitsuba_text(error: Exception, scene: SceneText) -> str:
-    """Mitsuba's message without locations in its C++ source and without Gonio's traceback."""
+    """Mitsuba's message, without locations in its C++ source and without a traceback of Gonio."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     ours = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)]
     text = lines[0] if lines else type(error).__name__
-    if ours:  # an error of a Gonio material, raised within Mitsuba's parser
+    if ours:  # an error of a Gonio material, raised inside Mitsuba's parser
         text = text.removesuffix("Traceback (most recent call last):")
         text += ours[-1].split(": ", 1)[1] if text != lines[0] else ""
     elif len(lines) > 1:
@@ -164,6 +166,6 @@ def _mitsuba_text(error: Exception, scene: SceneText) -> str:
 
 
 def sources(text: SceneText, parameters: Mapping[str, object]) -> tuple[Callable[[], str], dict[str, Path]]:
-    """A function that returns the text of a scene with all includes, and its files by their names in the scene."""
+    """A function that returns the text of a scene with all includes, and the files of the scene by their names."""
     given = repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))
     return lambda: "\n".join([given, *text.sources]), text.files

@@ -1,13 +1,13 @@
-"""Rewrite the XML of a Mitsuba scene as a single document without names that Mitsuba would have to look up.
+"""Rewrite the XML of a Mitsuba scene as a single document in which Mitsuba need not search for any file.
 
 Includes, search paths and parameters have the same meaning as in Mitsuba:
 
-    <default name="spp" value="16"/>       default of a parameter, which "$spp" refers to
+    <default name="spp" value="16"/>       the default of a parameter, whose value replaces "$spp"
     <include filename="materials.xml"/>    inserts another file here
-    <path value="textures"/>               a folder that is searched first for files of plugins
+    <path value="textures"/>               a folder that is searched first for the files of plugins
 
-Mitsuba would also search the current folder. In the rewritten text, each file is an absolute path that may be read, and
-each plugin is one that may be loaded.
+Mitsuba would also search the current folder. In the rewritten text, files are given by absolute paths and have been
+checked, and all plugins are allowed.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from ..measure import SAMPLE, parted
 from ..pictures import formats, scene_files
 from . import files, meshes
 
-MAX_BYTES = 64 << 20  # size of all files together, and of the text that parameters add
+MAX_BYTES = 64 << 20  # maximum size of all files together, and of the text that parameters add
 MAX_ELEMENTS = 1_000_000
 MAX_DEPTH = 64
-MAX_INCLUDES = 15  # nested, as in Mitsuba
-MAX_PARAMETER = 100  # characters of a parameter's name; up to this many are compared after each $
-MAX_VALUE = 1 << 20  # characters of a value in which parameters are replaced
+MAX_INCLUDES = 15  # maximum depth of nested includes, as in Mitsuba
+MAX_PARAMETER = 100  # maximum number of characters of a parameter's name, all of which are compared after each $
+MAX_VALUE = 1 << 20  # maximum number of characters of a value in which parameters are replaced
 
-# elements that describe an object, which a plugin creates
+# elements that describe an object created by a plugin
 OBJECTS = {"scene", "sensor", "film", "emitter", "sampler", "shape", "texture", "volume", "medium", "bsdf"}
 OBJECTS |= {"integrator", "phase", "rfilter"}
 
-# Characters to escape in attributes. Mitsuba reads "$" as a parameter unless a backslash precedes it.
+# Characters to escape in attributes. Mitsuba interprets "$" as a parameter unless it is preceded by a backslash.
 _ESCAPES = str.maketrans({"$": "\\$"} | {character: f"&#{ord(character)};" for character in '&<>"\t\n\r'})
 
 
@@ -47,9 +47,9 @@ class SceneText(NamedTuple):
     """A scene in the form that is passed to Mitsuba.
 
     text       XML with one element per line
-    origins    file and line that each line of `text` comes from
+    origins    the file and line from which each line of `text` originates
     files      the files that are read, by their names in the scene, including those of <include>
-    sources    the texts of the scene's XML files
+    sources    the texts of the XML files of the scene
     runs_code  whether the scene loads native plugins from its folder
     """
 
@@ -60,7 +60,7 @@ class SceneText(NamedTuple):
     runs_code: bool
 
     def located(self, message: str) -> str:
-        """A message of Mitsuba, with the user's files and lines in place of those of `text`."""
+        """A message of Mitsuba, in which lines of `text` are replaced by the user's files and lines."""
 
         def origin(match: re.Match[str]) -> str:
             file, line = self.origins[min(int(match[1]), len(self.origins)) - 1]
@@ -70,13 +70,13 @@ class SceneText(NamedTuple):
 
 
 def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False, allow_code: bool = False) -> SceneText:
-    """The text of a scene or of a single object.
+    """Read a scene or a single object, and rewrite its text.
 
-    parameters     values of its `$parameters`
-    allow_outside  allow the scene to name files outside its folder
-    allow_code     allow the scene to load native plugins from the folder `plugins` next to it
-    Raises InputError, with file and line, for XML that is not well-formed, for a file that must not be read or is
-    missing, for a plugin that must not be loaded, and for parameters that the scene does not have.
+    parameters     values of the `$parameters`
+    allow_outside  whether the scene may name files outside its folder
+    allow_code     whether the scene may load native plugins from the folder `plugins` next to it
+    Raises InputError, with file and line, for XML that is not well-formed, for a file that is missing or must not be
+    read, for a plugin that must not be loaded, and for parameters that the scene does not have.
     """
     reader = _Reader(file, parameters, allow_outside, allow_code)
     reader.parse(file, [reader.folder, plugin_search.package()])
@@ -91,9 +91,12 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
 
 
 def readable(name: str, path: Path, folder: Path, location: str, allow_outside: bool = False) -> str:
-    """The absolute path of a file of a scene, for Mitsuba; `name` and `location` are the file and its place in errors.
-    Raises InputError for a file that must not be opened: one outside the scene's folder, or an inconsistent one that
-    could corrupt the memory of a C++ library.
+    """The absolute path of a file of a scene, for Mitsuba.
+
+    name      name of the file in errors
+    location  location in the scene, for errors
+    Raises InputError for a file that must not be opened, because it is outside the scene's folder, or because it is
+    inconsistent and could cause memory errors in a C++ library.
     """
     files.checked(path, name, folder, location, allow_outside)
     try:
@@ -110,10 +113,10 @@ def readable(name: str, path: Path, folder: Path, location: str, allow_outside: 
 def property_value(
     kind: str, name: str, value: str, location: str, locate: Callable[[str], str], allow_code: bool = False
 ) -> str:
-    """The value of a string property of a plugin; if it names a file, the path of that file.
+    """The value of a string property of a plugin; if it names a file, the path of this file.
 
-    locate  function that returns the path of a file that may be read, given its name
-    Raises InputError for code that is not allowed, and if Mitsuba would search other folders for a file of that name.
+    locate  a function that maps the name of a file to its path, if the file may be read
+    Raises InputError for code that is not allowed, and if Mitsuba would search other folders for the file.
     """
     if outside.names_code(value) and not allow_code:
         what = f"'{value}' is code, which a scene alone does not run"
@@ -132,17 +135,17 @@ def property_value(
 
 
 class _Reader:
-    """The state that all files of a scene share.
+    """The common state of all files of a scene.
 
-    values   values of parameters, by name
-    folders  folders that are searched for files of plugins: those of <path> in the scene's own file, then the scene's
-             folder, then Mitsuba's
+    values   values of the parameters, by name
+    folders  folders that are searched for the files of plugins: those of <path> in the main file, then the folder of
+             the scene, then Mitsuba's own
     """
 
     def __init__(self, file: Path, parameters: Mapping[str, str], allow_outside: bool, allow_code: bool) -> None:
         self.file, self.folder = file, file.parent.resolve()
         self.values, self.used = dict(parameters), set[str]()
-        self.lengths = sorted({len(name) for name in parameters}, reverse=True)  # lengths of the parameters' names
+        self.lengths = sorted({len(name) for name in parameters}, reverse=True)  # lengths of the names of parameters
         self.allow_outside, self.allow_code = allow_outside, allow_code
         self.lines: list[str] = []
         self.origins: list[tuple[Path, int]] = []
@@ -150,15 +153,19 @@ class _Reader:
         self.sources: list[str] = []
         self.folders: list[Path] = []
         self.texts: list[tuple[int, str, dict[str, str], str]] = []  # strings of plugins: line, plugin, element, place
-        self.references: dict[str, set[str]] = {}  # id of an object -> ids of those that it needs
+        self.references: dict[str, set[str]] = {}  # id of an object -> ids of the objects on which it depends
         self.runs_code = False
-        self.version = ""  # version of the scene's own file
+        self.version = ""  # version of the main file
         self.bytes = self.elements = self.grown = 0  # bytes and elements read, and bytes that parameters have added
 
     # ------------------------------------------------------------------ files
 
     def parse(self, file: Path, folders: list[Path], included: Mapping[str, str] | None = None, level: int = 0) -> None:
-        """Append the content of a file. It searches `folders`; `included` is the element that includes it."""
+        """Append the content of a file.
+
+        folders   folders in which its files are searched
+        included  attributes of the element that includes the file
+        """
         try:
             data = file.read_bytes()
         except OSError as error:
@@ -178,7 +185,7 @@ class _Reader:
             self.folders = folders
 
     def place_files(self) -> None:
-        """Insert the paths of plugins' files into their lines; the folders to search are known only at the end."""
+        """Insert the paths of the files of plugins. The folders to search are known only after all files are read."""
         for line, kind, attributes, location in self.texts:
             locate = functools.partial(self.located, folders=self.folders, location=location)
             name, value = attributes.get("name", ""), attributes["value"]
@@ -186,11 +193,11 @@ class _Reader:
             self.lines[line] = _tag("string", {**attributes, "value": value})
 
     def check_references(self) -> None:
-        """Raise InputError for circular or overlong chains of references, since Mitsuba follows them recursively."""
+        """Raise InputError for circular or too long chains of references, because Mitsuba follows them recursively."""
         depths = dict.fromkeys({*self.references, *(n for names in self.references.values() for n in names)}, 0)
         waiting = Counter(name for names in self.references.values() for name in names)
         ready = [name for name in depths if not waiting[name]]
-        for name in ready:  # `ready` grows by objects whose references have all been followed
+        for name in ready:  # an object is appended to `ready` when all of its references have been followed
             for inner in self.references.get(name, ()):
                 depths[inner] = max(depths[inner], depths[name] + 1)
                 waiting[inner] -= 1
@@ -218,7 +225,7 @@ class _Reader:
     # ------------------------------------------------------------------ parameters
 
     def replaced(self, value: str, location: str) -> str:
-        """A value with parameters replaced by their values; after each $, the longest matching name is used."""
+        """A value in which parameters are replaced by their values. After each $, the longest matching name is used."""
         if "$" not in value:
             return value
         first, *others = re.split(r"(?<!\\)\$", value)
@@ -250,20 +257,20 @@ class _Reader:
             self.lengths = sorted({*self.lengths, len(name)}, reverse=True)
 
     def count(self, location: str) -> None:
-        """Count an element, or a parameter that is replaced. Raises InputError if there are too many."""
+        """Count an element or a replaced parameter. Raises InputError if there are too many of them."""
         self.elements += 1
         if self.elements > MAX_ELEMENTS:
             raise InputError(f"more than {MAX_ELEMENTS} elements", location, "keep large data in other files")
 
 
 class _File:
-    """The handlers for the elements of one file of a scene, called by the parser."""
+    """The handlers for the elements of one file of a scene, which the parser calls."""
 
     def __init__(
         self, scene: _Reader, file: Path, folders: list[Path], included: Mapping[str, str] | None, level: int
     ) -> None:
         self.scene, self.file, self.folders, self.included, self.level = scene, file, folders, included, level
-        self.open: list[str] = []  # enclosing elements, "" for those that are resolved here and not written
+        self.open: list[str] = []  # enclosing elements; "" for those that are resolved here and not written
         self.kinds: list[str] = []  # plugin types of the same elements
         self.ids: list[str] = []  # ids of the same elements
         self.parser = expat.ParserCreate()
@@ -327,7 +334,7 @@ class _File:
         self._line(_tag(tag, attributes))
 
     def _note_reference(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Record which objects a named object depends on: those that it refers to, and named objects inside it."""
+        """Record the objects on which a named object depends: objects to which it refers, and named ones inside it."""
         references, name = self.scene.references, attributes.get("id", "")
         if tag == "alias":
             references.setdefault(attributes.get("as", ""), set()).add(name)
@@ -364,8 +371,11 @@ class _File:
         self.scene.parse(path, folders, attributes, self.level + 1)
 
     def _root(self, tag: str, attributes: dict[str, str]) -> str:
-        """The root element as it is written: "" for an included scene, since only its content is written; any other
-        included object gets the name of its <include>."""
+        """The root element in the form in which it is written.
+
+        It is "" for an included scene, of which only the content is written. Any other included object gets the name of
+        its <include>.
+        """
         if tag not in OBJECTS:
             raise InputError(f"the file begins with <{tag}>", self.location, "a <scene> or another object is expected")
         (version,) = self._required(tag, attributes, "version")
@@ -390,11 +400,11 @@ class _File:
 
 
 def _is_old(version: str) -> bool:
-    """Whether Mitsuba interprets the property names of a file as those from before its version 2."""
+    """Whether Mitsuba interprets the property names of a file as those of versions before 2."""
     return version.strip().split(".")[0] in ("0", "1")
 
 
 def _tag(tag: str, attributes: Mapping[str, str]) -> str:
-    """The start tag of an element, with escaped values."""
+    """The start tag of an element, with escaped attribute values."""
     written = [f' {name}="{value.translate(_ESCAPES)}"' for name, value in attributes.items()]
     return f"<{tag}{''.join(written)}>"

@@ -1,8 +1,8 @@
-"""Overrides: setting values of a scene by path, as `gonio study --vary shapes.*.material.roughness=0.1,0.5` does.
+"""Overrides: set values of a scene by path, as in `gonio study --vary shapes.*.material.roughness=0.1,0.5`.
 
-A path is a JSON pointer ("/scene/shapes/0/material/p") or dotted ("scene.shapes.0.material.p"); the leading `scene`
-is optional, and `*` matches every item. Values are set in the raw JSON before validation, as if the file contained
-them.
+A path is a JSON pointer ("/scene/shapes/0/material/p") or a dotted path ("scene.shapes.0.material.p"). The leading
+`scene` is optional, and `*` matches every item. Values are set in the raw JSON before validation, as if the file
+contained them.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .materials import described, part_of
 
 
 def apply(raw: dict[str, Json], overrides: Mapping[str, object]) -> None:
-    """Set each path to its value, in place. Raises InputError for a wrong path or a value that is not JSON."""
+    """Set the value at each path, in place. Raises InputError for an invalid path, and for a value that is not JSON."""
     for path, value in overrides.items():
         _check_text(path, path)
         _set(raw, path, _plain(value, path))
 
 
 def _plain(value: object, path: str) -> Json:
-    """The value as a scene file would contain it, with lists in place of tuples and arrays."""
+    """A value in the form in which a scene file would contain it, with lists in place of tuples and arrays."""
     if isinstance(value, Mapping):
         for key in value:
             _check_text(str(key), path)
@@ -44,7 +44,7 @@ def _plain(value: object, path: str) -> Json:
 
 
 def _check_text(text: str, path: str) -> None:
-    """Raise InputError for bytes from the command line that are not UTF-8, which no scene file can contain."""
+    """Raise InputError if a text from the command line is not valid UTF-8, because scene files must be UTF-8."""
     if encodable(text) != text:
         raise InputError(f"'{text}' is not valid text", f"path {path}", "write it in UTF-8")
 
@@ -96,7 +96,7 @@ def _keys(holder: Json) -> list[str]:
 
 
 def _below(holder: Json, step: str, path: str, before: list[str], steps: list[str]) -> list[Json]:
-    """The values one step down; after a `*`, holders without that key are skipped."""
+    """The values one step below the given ones. After a `*`, values without the key are skipped."""
     if step == "*":
         return list(holder.values()) if isinstance(holder, dict) else list(holder) if isinstance(holder, list) else []
     if isinstance(holder, dict):
@@ -104,7 +104,7 @@ def _below(holder: Json, step: str, path: str, before: list[str], steps: list[st
             return [holder[step]]
         if "*" in before:
             return []
-        inner = holder.get("scene")  # a dotted path may begin with its keys
+        inner = holder.get("scene")  # a dotted path may begin with the keys of `scene`
         known = [*holder, *(inner if isinstance(inner, dict) else ())]
         raise InputError(f"no key '{step}'", f"path {path}", did_you_mean(step, [str(key) for key in known]))
     if isinstance(holder, list):
@@ -122,7 +122,7 @@ def _index(holder: list[Json], step: str, path: str) -> int:
 
 
 def _that_take(holders: list[Json], key: str) -> list[Json]:
-    """The objects that have the key; if none does, the materials that accept it."""
+    """The objects that have the key; if there are none, the materials that accept it."""
     with_key: list[Json] = []
     with_key += [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdecimal())]
     if with_key:

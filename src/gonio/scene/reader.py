@@ -1,4 +1,4 @@
-"""Read a scene: parse the file, apply overrides, validate, and locate the files that it names."""
+"""Read a scene: parse the file, apply overrides, validate the result, and locate the files that it names."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .schema import SceneDescription
 from .text import kind_of, pointer, read_json
 from .values import Part
 
-MAX_SHOWN = 4  # errors reported at once: enough to correct a file in one pass, few enough to read
+MAX_SHOWN = 4  # number of errors reported at once: enough to correct most files in one pass, but few enough to read
 
 
 def read(
@@ -30,12 +30,12 @@ def read(
     overrides: Mapping[str, object] | None = None,
     names_output: bool = True,
 ) -> SceneDescription:
-    """A scene from a folder with a scene.json, or from a .json file.
+    """Read a scene from a folder with a scene.json, or from a .json file.
 
-    allow_outside  allow textures and meshes outside the scene's folder
-    allow_code     allow materials that are classes in Python files, "ward.py:Ward", which are then executed
-    overrides      values to set before validation, by path: {"shapes.1.material.p": 16}; see `overrides`
-    names_output   whether the picture is written to the file that the scene names; the name is then checked
+    allow_outside  whether textures and meshes outside the scene's folder are allowed
+    allow_code     whether materials may be classes in Python files, such as "ward.py:Ward", which are then executed
+    overrides      values to set before validation, by path, such as {"shapes.1.material.p": 16}; see `overrides`
+    names_output   whether the picture is written to the file that the scene names, so that the name must be valid
     Raises InputError for any error in the file or in the files that it names.
 
         description = read("scenes/phong", overrides={"shapes.*.material.roughness": 0.3})
@@ -98,7 +98,10 @@ def _check_output(description: SceneDescription) -> None:
 
 
 def _check_material(description: SceneDescription, where: str, material: MaterialPart) -> list[tuple[str, str]]:
-    """Warnings about a material, as (pointer relative to the material, text). Raises InputError if it is invalid."""
+    """The warnings about a material, as pairs (JSON pointer relative to the material, text).
+
+    Raises InputError if the material is invalid.
+    """
     warnings = [("", f"{material._source}: {notice}") for notice in material._notices]
     for name, (value, key, _) in material.arguments().items():
         parameter = material.model.parameters()[name]
@@ -116,7 +119,7 @@ def _check_material(description: SceneDescription, where: str, material: Materia
 
 
 def parts(part: Part) -> Iterator[tuple[str, Part]]:
-    """Every object of a scene with its JSON pointer, parents first, in the order of the file's keys."""
+    """Every object of a scene with its JSON pointer, in the order of the keys in the file; parents come first."""
     todo = [("", part)]
     while todo:
         steps, part = todo.pop()
@@ -144,7 +147,7 @@ def _key(part: type[Part], field: str) -> str:
 
 
 def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str, Path]]:
-    """(a function that returns the scene as text, including overrides; the files that the scene uses).
+    """A function that returns the scene as text, including overrides, and the files that the scene uses.
 
     The files are textures, meshes, documents and Python files, by their names in the scene.
     """
@@ -172,9 +175,10 @@ def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str,
 
 
 def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
-    """The errors of a validation as one InputError.
+    """Convert the errors of a validation to one InputError.
 
-    The first one has a location, problem and hint; each of the next few is a line with the hint in parentheses.
+    The first error determines the location, the problem and the hint. Each of the next few errors is a line with the
+    hint in parentheses.
     """
     problems: dict[str, tuple[str, str]] = {}
     for detail in error.errors(include_url=False):
@@ -190,20 +194,20 @@ def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
     return InputError("\n  ".join(lines), f"{file}#{where}", hint)
 
 
-# hints for types of other programs for which the most similar name would be misleading
+# hints for types of other programs, for which suggesting the most similar name would be misleading
 ELSEWHERE = {
     "pointLight": "write 'spotLight', which shines equally in all directions",
     "point": "write 'spotLight', which shines equally in all directions",
 }
 
 
-# objects for which a string can only be the value of one key
+# objects for which a string can only be meant as the value of one key
 KEY_OF_STRING = {"output": "filename", "integrator": "type"}
 
 
 def _type_of(file: str) -> str:
-    """The type of a material or shape that a file holds, by its suffix."""
-    from ..catalog import documents  # readers of files, not needed by scenes without such files
+    """The type of the material or shape in a file, judging by its suffix."""
+    from ..catalog import documents  # imported here, because most scenes do not need readers of files
     from ..measure import names_table
 
     for document in documents.Document.family.all().values():
@@ -213,7 +217,7 @@ def _type_of(file: str) -> str:
 
 
 def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
-    """Pointer, problem and hint for one of pydantic's errors."""
+    """The JSON pointer, problem and hint for one of pydantic's errors."""
     kind, context = detail["type"], detail.get("ctx", {})
     steps, value = _place(detail["loc"], raw, keep_last=kind == "missing")
     got = kind_of(value)
@@ -269,8 +273,7 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
 
 
 def _as_object(value: Json) -> str:
-    """How to write a material by its name, a class, or a file's name, where an object or its type is expected; "" for
-    other values."""
+    """A hint for a name of a material, class or file where an object is expected; "" for other values."""
     if not isinstance(value, str):
         return ""
     name, bracket, _ = value.partition("(")
@@ -284,7 +287,7 @@ def _as_object(value: Json) -> str:
 
 
 def _plain(known: list[str]) -> list[str]:
-    """One spelling of each name: without underscores, and without the prefix "gonio-"."""
+    """One spelling of each name, without underscores and without the prefix "gonio-"."""
     return [name for name in known if "_" not in name and not name.startswith("gonio-")]
 
 
@@ -296,11 +299,11 @@ def _unquote(value: Json) -> str:
 
 
 def _place(location: tuple[str | int, ...], raw: Json, keep_last: bool) -> tuple[list[str | int], Json]:
-    """The steps to a value in the file, without the tags of unions that pydantic's location contains, and the value."""
+    """The path to a value in the file, without the union tags that pydantic adds to locations, and the value."""
     steps: list[str | int] = []
     value = raw
     for index, step in enumerate(location):
-        # A tag equals the object's own `type`, and no key has the name of a type.
+        # A tag equals the `type` of the object, and no key has the name of a type.
         in_object = isinstance(value, dict) and step in value and step != value.get("type")
         in_list = isinstance(value, list) and isinstance(step, int) and step < len(value)
         if in_object or in_list:

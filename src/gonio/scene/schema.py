@@ -30,10 +30,10 @@ MAX_SAMPLES = 2**30  # samples per pixel, which can still be counted in 32 bits
 
 
 class Output(Part):
-    """The file that the picture is written to."""
+    """The file to which the picture is written."""
 
     filename: str = Field(min_length=1)
-    """A name ending in .hdr, .png, .exr or .npz; with `-o FILE`, any name is accepted. The top row comes first."""
+    """A name that ends in .hdr, .png, .exr or .npz; with `-o FILE`, any name is accepted. Row 0 is the top row."""
 
     @model_validator(mode="after")
     def _known_format(self, info: ValidationInfo) -> Output:
@@ -45,10 +45,10 @@ class Output(Part):
 
 
 class Sampler(Part):
-    """The number of samples per pixel and their random numbers. Give `samples`, or both `xSamples` and `ySamples`."""
+    """The number of samples per pixel, and the random numbers. Give `samples`, or both `xSamples` and `ySamples`."""
 
     type: str = "independent"
-    """Name of the random-number sampler. Lab 2's value, "independent", expresses no preference and means "default"."""
+    """Name of the random-number sampler. The value used in Lab 2, "independent", selects the default sampler."""
     x_samples: Whole | None = Field(None, alias="xSamples", ge=1, le=MAX_SAMPLES)
     """Samples per pixel = xSamples * ySamples."""
     y_samples: Whole | None = Field(None, alias="ySamples", ge=1, le=MAX_SAMPLES)
@@ -141,17 +141,19 @@ class Camera(Part):
 
     type: Literal["pinhole"] = "pinhole"
     transform: CameraTransform
+    """Position and orientation of the camera."""
     vertical_fov: Number = Field(alias="verticalFov", gt=0, lt=180)
     """Vertical field of view, in degrees."""
     film: Film
+    """The size of the picture."""
     t_near: Positive = Field(1e-4, alias="tNear")
     """Near clipping distance."""
     t_far: Positive = Field(1e10, alias="tFar")
     """Far clipping distance."""
     polarizer: Number | None = None
-    """Adds an ideal linear polarizer in front of the lens: the direction of polarization that it transmits, in degrees
-    counterclockwise from the picture's horizontal. Unpolarized light loses half of its power. The scene is then
-    rendered by Mitsuba's path tracer in a polarized variant.
+    """Direction of polarization that is transmitted by an ideal linear polarizer in front of the lens, in degrees
+    counterclockwise from the picture's horizontal. The polarizer absorbs half of the power of unpolarized light. A
+    scene with this key is rendered by Mitsuba's path tracer in a polarized variant.
     """
     time_start: Number = Field(0.0, alias="timeStart")
     """No effect: scenes are static."""
@@ -182,7 +184,7 @@ def _list_integrators(schema: dict[str, Any]) -> None:
 
 
 class Integrator(Part):
-    """The integrator, which determines what the picture shows."""
+    """The integrator, which determines the quantity that the picture shows."""
 
     model_config = ConfigDict(json_schema_extra=_list_integrators)
 
@@ -227,8 +229,11 @@ class Transform(Part):
     """The shape is first scaled, then rotated, then translated: the matrix is translate * rotate * scale."""
 
     translate: Vector = (0.0, 0.0, 0.0)
+    """Translation along x, y and z."""
     rotate: Rotation | None = None
+    """Rotation about an axis through the origin."""
     scale: Vector = (1.0, 1.0, 1.0)
+    """Scale factors along x, y and z."""
 
     @model_validator(mode="after")
     def _is_invertible(self) -> Transform:
@@ -251,8 +256,9 @@ class ShapePart(Part):
     """The keys that all shapes share."""
 
     material: Material | None = None
-    """The default is `matte` with an albedo of 0.5."""
+    """Material of the shape; by default, `matte` with an albedo of 0.5."""
     transform: Transform = Transform()
+    """Transformation of the shape."""
 
 
 class Sphere(ShapePart):
@@ -260,8 +266,9 @@ class Sphere(ShapePart):
 
     type: Literal["sphere"]
     center: Vector
+    """Center of the sphere."""
     radius: Positive
-    """`transform` does not scale the radius."""
+    """Radius of the sphere; `transform` does not scale it."""
 
 
 class Parallelogram(ShapePart):
@@ -272,8 +279,11 @@ class Parallelogram(ShapePart):
 
     type: Literal["parallelogram"]
     base: Vector
+    """The corner with u = v = 0."""
     edge0: Vector
+    """The edge along which u increases."""
     edge1: Vector
+    """The edge along which v increases."""
 
     @model_validator(mode="after")
     def _has_an_area(self) -> Parallelogram:
@@ -310,6 +320,7 @@ class Disk(ShapePart):
 
     type: Literal["disk"]
     radius: Positive = 1.0
+    """Radius of the disk."""
     inner_radius: NonNegative = 0.0
     """Radius of the hole in the center."""
     phi_max: Turn = 2 * math.pi
@@ -334,7 +345,9 @@ class Cylinder(ShapePart):
 
     type: Literal["cylinder"]
     radius: Positive = 1.0
+    """Radius of the cylinder."""
     height: Positive = 1.0
+    """Height of the cylinder."""
     phi_max: Turn = 2 * math.pi
     """Angle of the sector about the z axis, in radians. The default is a full turn."""
 
@@ -347,18 +360,20 @@ class Cone(ShapePart):
 
     type: Literal["cone"]
     radius: Positive = 1.0
+    """Radius of the base."""
     height: Positive = 1.0
+    """Distance from the base to the apex."""
     phi_max: Turn = 2 * math.pi
     """Angle of the sector about the z axis, in radians. The default is a full turn."""
 
 
 class Mesh(ShapePart):
-    """Triangles from an .obj or .ply file in the scene's folder. `triangle` is Lab 2's name for this type."""
+    """Triangles from an .obj or .ply file in the scene's folder. This type is called `triangle` in Lab 2."""
 
     type: Literal["triangle", "mesh"]
     file: str = Field(min_length=1)
-    """The mesh. Its texture coordinates are used unchanged, and v = 0 is the top of a texture. Without normals in the
-    file, the mesh is flat-shaded.
+    """The mesh file. Its texture coordinates are used unchanged, and v = 0 is the top of a texture. If the file
+    contains no normals, the mesh is flat-shaded.
     """
 
 
@@ -366,19 +381,21 @@ Shape = Annotated[Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh,
 
 
 class AreaLight(Part):
-    """A shape that emits the same radiance everywhere, in all directions, from both sides."""
+    """A shape that emits a constant radiance in all directions, from both sides."""
 
     type: Literal["areaLight"]
     energy: Radiance
     """Emitted radiance, W/(m^2 sr)."""
     shape: Shape
+    """The shape that emits the light."""
 
 
 class SpotLight(Part):
-    """A point light with equal intensity in all directions; the name `spotLight` is Lab 2's."""
+    """A point light with equal intensity in all directions; the name `spotLight` is that of Lab 2."""
 
     type: Literal["spotLight"]
     position: Vector
+    """Position of the light."""
     energy: Radiance
     """Intensity, W/sr."""
 
@@ -433,7 +450,9 @@ class Contents(Part):
     acceleration: Literal["embree", "linear", "bvh", "octree"] = "embree"
     """No effect: Gonio uses Mitsuba's acceleration structure, or none if the scene has only a few simple shapes."""
     shapes: list[Shape] = Field(default_factory=list)
+    """The shapes."""
     lights: list[LightSource] = Field(default_factory=list)
+    """The lights, with at most one `environmentLight`."""
     ambient: Light | None = None
     """Radiance of the ambient light, Ia in eq. 1 of the Lab 2 sheet. It affects only materials that have a `ka`."""
 
@@ -450,12 +469,17 @@ class SceneDescription(Part):
     json_schema: str | None = Field(None, alias="$schema")
     """URL of the JSON Schema, for editors."""
     output: Output
+    """The file to which the picture is written."""
     sampler: Sampler
+    """The number of samples per pixel, and the random numbers."""
     camera: Camera
+    """The camera."""
     integrator: Integrator
+    """The integrator."""
     contents: Contents = Field(alias="scene")
+    """The shapes and lights."""
     top_ambient: Light | None = Field(None, alias="ambient")
-    """The same as `scene.ambient`."""
+    """Alternative position of the key `scene.ambient`."""
 
     _path: Path = PrivateAttr(default=Path("scene.json"))
     _allow_outside: bool = PrivateAttr(default=False)
@@ -514,7 +538,7 @@ class SceneDescription(Part):
         return f"{self._path}#{pointer}"
 
     def locate(self, file: str, pointer: str) -> Path:
-        """The path of a file that the scene names. Raises InputError if it is missing or outside the folder."""
+        """The path of a file to which the scene refers. Raises InputError if it is missing or outside the folder."""
         return located(file, self.folder, self.where(pointer), self._allow_outside)
 
 

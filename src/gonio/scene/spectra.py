@@ -1,4 +1,4 @@
-"""Emission spectra of lamps: spectra in Mitsuba's spectral variants, colors in the others."""
+"""Emission spectra of lamps, which are spectra in Mitsuba's spectral variants and colors in other variants."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SECOND_RADIATION = 1.438776877e7  # nm K, hc/k in Planck's law
 
 
 def emitted(light: Colour | LightSpectrum) -> PluginDict:
-    """A light's radiance as a Mitsuba plugin: a spectrum if the variant and the light are spectral, else rgb."""
+    """The radiance of a light as a Mitsuba plugin: a spectrum if both the variant and the light are spectral, else rgb."""
     if engine.load().is_spectral and not np.any(light.scale if isinstance(light, LightSpectrum) else light):
         return {"type": "uniform", "value": 0.0}  # Mitsuba rejects a `regular` spectrum that is 0 everywhere
     if isinstance(light, LightSpectrum) and engine.load().is_spectral:
@@ -30,8 +30,10 @@ def emitted(light: Colour | LightSpectrum) -> PluginDict:
 
 
 def colour(light: Colour | LightSpectrum) -> list[float]:
-    """A light's radiance as linear sRGB. Colors outside the gamut are clipped at 0 and rescaled to preserve
-    luminance."""
+    """The radiance of a light as linear sRGB.
+
+    Colors outside the gamut are clipped at 0 and rescaled to preserve the luminance.
+    """
     if not isinstance(light, LightSpectrum):
         return values.rgb(light)
     if isinstance(light, values.Daylight):
@@ -43,7 +45,7 @@ def colour(light: Colour | LightSpectrum) -> list[float]:
 
 
 def curve(light: LightSpectrum) -> Floats:
-    """Spectral radiance on `GRID`, scaled so that its luminance is the light's `scale`."""
+    """The spectral radiance of a light on `GRID`, scaled so that the luminance equals the light's `scale`."""
     table = _relative(light)
     return table * (light.scale / float(_observer()[1] @ table))
 
@@ -65,7 +67,7 @@ def _relative(light: LightSpectrum) -> Floats:
 
 
 def _observer() -> Floats:
-    """Mitsuba's CIE 1931 curves, (3, N), scaled so that a constant radiance of 1, Mitsuba's white, has Y = 1."""
+    """Mitsuba's CIE 1931 color matching functions, (3, N), scaled so that a constant radiance of 1 has Y = 1."""
     from ..transport.scene_data import CIE_Y_INTEGRAL
 
     mi = engine.load()

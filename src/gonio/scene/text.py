@@ -1,7 +1,8 @@
 """Parse the text of a scene file: strict JSON of bounded size and depth, as plain Python values.
 
-Python's own parser is too lenient for files that people edit by hand (of two equal keys it takes the last, and it
-accepts NaN) and fails on deep nesting. Here, each of these is an `InputError` with the location in the file.
+Python's own parser is too lenient for files that people edit by hand, because it accepts NaN and duplicate keys, of
+which it uses the last. It also fails on deep nesting. This module reports each of these as an `InputError` with the
+location in the file.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from typing import NoReturn
 from ..bridge.types import Json
 from ..errors import InputError
 
-MAX_BYTES = 64 * 2**20  # geometry and images are stored in separate files
-MAX_DEPTH = 64  # the lab's scenes have a depth of 8; 64 allows nested mixes and is far below any stack limit
-MAX_INTEGER = 2**53  # beyond this a double cannot represent every integer
+MAX_BYTES = 64 * 2**20  # maximum size of a file; geometry and images are stored in separate files
+MAX_DEPTH = 64  # the depth of the lab's scenes is 8; 64 allows nested mixes and is far below any stack limit
+MAX_INTEGER = 2**53  # a double cannot represent every larger integer
 
 
 def pointer(*steps: str | int) -> str:
@@ -27,7 +28,7 @@ def pointer(*steps: str | int) -> str:
 
 
 def read_json(path: Path) -> dict[str, Json]:
-    """The object in a JSON file. Raises InputError for anything that a scene file must not contain."""
+    """Read the object in a JSON file. Raises InputError for anything that a scene file must not contain."""
     text = _text(path)
     try:
         value = _checked(json.loads(text, object_pairs_hook=_Object, parse_constant=_NotFinite), path, ())
@@ -42,7 +43,7 @@ def read_json(path: Path) -> dict[str, Json]:
         ) from None
     except InputError:
         raise
-    except ValueError as error:  # an integer with more digits than Python converts
+    except ValueError as error:  # an integer with more digits than Python can convert
         raise InputError(f"not a usable number: {error}", str(path), "give a number below 1e18") from None
     if not isinstance(value, dict):
         raise InputError(
@@ -67,7 +68,7 @@ def kind_of(value: object) -> str:
 
 
 class _Object(dict[str, Json]):
-    """A JSON object with a list of its duplicate keys."""
+    """A JSON object, with a list of its duplicate keys."""
 
     def __init__(self, pairs: list[tuple[str, Json]]) -> None:
         super().__init__(pairs)
@@ -109,7 +110,7 @@ def _text(path: Path) -> str:
 def _check_depth(text: str, path: Path) -> None:
     """Raise InputError with the line at which the text is nested too deeply."""
     depth = 0
-    # Strings first, so that brackets inside them are not counted; an unclosed string is left to the JSON parser.
+    # Strings are matched first, so that brackets in them are not counted; the JSON parser reports unclosed strings.
     for match in re.finditer(r'"(?:[^"\\]|\\.)*"|[\[{\]}]', text):
         character = match.group()
         if character in "[{":
@@ -126,12 +127,12 @@ def _check_depth(text: str, path: Path) -> None:
 
 
 def _plain(value: Json) -> bool:
-    """Whether a value is a finite float, as most values of a large file are."""
+    """Whether a value is a finite float, like most values in a large file."""
     return type(value) is float and math.isfinite(value)
 
 
 def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
-    """The value in plain types. Raises InputError for the first value that JSON or a scene does not allow."""
+    """Convert a value to plain types. Raises InputError for the first value that JSON or a scene does not allow."""
     if _plain(value):
         return value
     if len(steps) >= MAX_DEPTH and isinstance(value, (dict, list)):
@@ -183,7 +184,7 @@ def _syntax_hint(text: str, position: int) -> str:
 
 
 def walk(value: Json, steps: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Json]]:
-    """Every value in a tree of dicts and lists, with the steps that lead to it; parents first."""
+    """Every value in a tree of dictionaries and lists, with the path to the value; parents come first."""
     yield steps, value
     if isinstance(value, dict):
         for key, item in value.items():

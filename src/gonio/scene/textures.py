@@ -1,4 +1,4 @@
-"""Images of a scene: checked for size, decoded to linear float32, and passed to Mitsuba as textures."""
+"""Images of a scene: they are checked for size, decoded to linear float32, and passed to Mitsuba as textures."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from ..pictures.images import RGB
 
 
 def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | None = None, inside: str = "") -> RGB:
-    """The image as float32 (height, width, 1 or 3), row 0 on top; 8-bit values as v/255, decoded if `srgb`.
+    """Load an image as float32, (height, width, 1 or 3), with row 0 on top. 8-bit values are divided by 255.
 
-    where    the location in the scene that errors name
-    channel  the single channel to read, "r", "g", "b" or "a"; alpha is never decoded, and is 1 if the image has none
-    inside   the number of the image in a document that contains several
-    Raises InputError if the file is not an image, claims more pixels than it can hold, or contains NaN.
+    where    location in the scene, for errors
+    srgb     whether to decode sRGB values to linear ones
+    channel  the single channel to read, "r", "g", "b" or "a"; alpha is never decoded, and is 1 if the image has no
+    alpha inside   number of the image in a document that contains several images
+    Raises InputError if the file is not an image, states more pixels than it can contain, or contains NaN.
     """
     name = path.name
     if path.stat().st_size > scene_files.MAX_BYTES:
@@ -34,13 +35,13 @@ def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | Non
     with ExitStack() as stack:
         if inside:
             name, content = f"{name}#{inside}", _inside(path, inside)
-            path = Path(stack.enter_context(TemporaryDirectory())) / "image"  # Mitsuba reads files
+            path = Path(stack.enter_context(TemporaryDirectory())) / "image"  # Mitsuba can only read files
             path.write_bytes(content)
         values, integers = _decoded(path, content, name, where)
     if channel == "a":
         values = values[..., -1:] if values.shape[2] in (2, 4) else np.ones_like(values[..., :1])
     else:
-        values = values[..., :3] if values.shape[2] >= 3 else values[..., :1]  # without alpha
+        values = values[..., :3] if values.shape[2] >= 3 else values[..., :1]  # drops alpha
         if integers and srgb:
             values = images.from_screen(values)
         if channel is not None and values.shape[2] == 3:
@@ -69,8 +70,8 @@ def _decoded(path: Path, content: bytes, name: str, where: str) -> formats.Decod
 
 
 def bitmap(mi: ModuleType, values: RGB, filter_type: str, wrap: str) -> PluginDict:
-    """A Mitsuba texture of values that are already linear; v = 0 is the top row, as in Mitsuba."""
-    # With `raw`, a color reaches the material unchanged; spectral variants must convert it to a spectrum.
+    """A Mitsuba texture from values that are already linear; v = 0 is the top row, as in Mitsuba."""
+    # With `raw`, colors are passed to the material unchanged, but spectral variants must convert them to spectra.
     raw = values.shape[2] == 1 or not mi.variant().endswith("spectral")
     return {
         "type": "bitmap",
@@ -82,12 +83,12 @@ def bitmap(mi: ModuleType, values: RGB, filter_type: str, wrap: str) -> PluginDi
 
 
 def environment(mi: ModuleType, values: RGB) -> PluginDict:
-    """An environment from an image in which direction (sin t sin p, cos t, sin t cos p) has u = p/2pi, v = t/pi.
+    """An environment from an image in which the direction (sin t sin p, cos t, sin t cos p) has u = p/2pi, v = t/pi.
 
-    Mitsuba's `envmap` differs in two ways. Its azimuth runs the other way, (sin p, -cos p); the image is therefore
-    mirrored left to right and rotated by half a turn. Its rows lie at v = j/(h - 1), including the poles, instead of
-    (j + 0.5)/h. The rows are therefore laid out at twice the density: row 2j + 1 is row j, and each row between two of
-    these is their mean, so that linear interpolation is unchanged.
+    Mitsuba's `envmap` differs in two respects. Its azimuth increases in the opposite direction, (sin p, -cos p), so the
+    image is mirrored left to right and rotated by half a turn. Its rows are at v = j/(h - 1), including the poles,
+    instead of (j + 0.5)/h, so the number of rows is doubled: row 2j + 1 is row j of the image, and each row between two
+    of these is their mean, which leaves the linear interpolation unchanged.
     """
     values = np.broadcast_to(values, (*values.shape[:2], 3))
     rows = np.empty((2 * values.shape[0] + 1, values.shape[1], 3), np.float32)

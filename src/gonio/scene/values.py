@@ -34,8 +34,8 @@ MAX_NUMBER = 1e18  # its square fits into a 32-bit float, so that lengths of vec
 
 
 def invalid(what: str, hint: str, key: str = "") -> PydanticCustomError:
-    """An error for a validator to raise; `key` is the key that the error is about."""
-    # Braces would be read as placeholders, so the text is passed as the value of one.
+    """An error for a validator to raise; `key` is the key to which the error refers."""
+    # Braces would be interpreted as placeholders, so the text is passed as the value of a placeholder.
     return PydanticCustomError("scene", "{what}", {"what": what, "hint": hint, "key": key})
 
 
@@ -59,8 +59,11 @@ class Part(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """The JSON Schema with the docstrings of the fields. Pydantic itself would read them from the source whenever
-        a class is created, which would make creating a scene's classes take 1.5 times as long."""
+        """The JSON Schema, with the docstrings of the fields as descriptions.
+
+        Pydantic would read the docstrings from the source whenever a class is created, and creating the classes of a
+        scene would take 1.5 times as long.
+        """
         schema = handler(core)
         properties = handler.resolve_ref_schema(schema).get("properties", {})
         for name, text in _docstrings(cls).items():
@@ -71,7 +74,7 @@ class Part(BaseModel):
 
     @classmethod
     def known_keys(cls) -> list[str]:
-        """The keys of this object, as spelled in the file."""
+        """The keys of this object, as they are spelled in the file."""
         return [field.alias or name for name, field in cls.model_fields.items()]
 
     @classmethod
@@ -81,7 +84,7 @@ class Part(BaseModel):
 
 
 def _docstrings(cls: type[Part]) -> dict[str, str]:
-    """The docstrings of the fields of a class and its bases, as far as the classes are defined in a module."""
+    """The docstrings of the fields of a class and of its base classes that are defined in a module."""
     texts: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         module = sys.modules[base.__module__]
@@ -107,7 +110,7 @@ def _documented(module: ModuleType) -> dict[str, dict[str, str]]:
 
 
 def _not_a_flag(value: object) -> object:
-    if isinstance(value, bool):  # Python counts True as 1
+    if isinstance(value, bool):  # in Python, True is a number
         raise invalid(f"expected a number, got {kind_of(value)}", "give a number")
     return value
 
@@ -158,7 +161,7 @@ def _kind_of_value(value: object) -> str | None:
 
 
 def _either(expected: str) -> Discriminator:
-    """Distinguish numbers, lists and textures by the type of the value. Thanks to the <>, no tag is equal to a key."""
+    """Distinguish numbers, lists and textures by the type of the value. Tags contain <>, so no tag equals a key."""
     return Discriminator(_kind_of_value, "expected", expected)
 
 
@@ -180,13 +183,13 @@ class ImageTexture(Part):
     filter: Literal["bilinear", "nearest"] = "bilinear"
     """Interpolation between texels."""
     wrap: Literal["repeat", "mirror", "clamp"] = "repeat"
-    """How the image continues outside [0, 1]."""
+    """Continuation of the image outside [0, 1]."""
     channel: Literal["r", "g", "b", "a"] | None = None
-    """The only channel to use, as gray. Without this key, a scalar parameter takes the mean of red, green and blue."""
+    """The channel to use as a gray value. Without this key, a scalar parameter uses the mean of red, green and blue."""
     factor: Factor = 1.0
-    """The values of the image are multiplied by this factor: one number, or one per channel."""
+    """Factor by which the values of the image are multiplied: one number, or one number per channel."""
     mean: Annotated[bool, Strict()] = False
-    """Whether to use the mean of the image everywhere, for a parameter that must not vary over a surface."""
+    """Whether to use the mean of the image everywhere, for parameters that cannot vary over a surface."""
 
 
 class NormalMap(Part):
@@ -198,7 +201,7 @@ class NormalMap(Part):
     file: str = Field(min_length=1)
     """An image in the scene's folder."""
     scale: Number = 1.0
-    """The slopes of the normals are multiplied by this factor."""
+    """Factor by which the slopes of the normals are multiplied."""
 
 
 class BumpMap(Part):
@@ -210,7 +213,7 @@ class BumpMap(Part):
     file: str = Field(min_length=1)
     """An image in the scene's folder."""
     scale: Number
-    """Height where the image is 1, in units of the scene."""
+    """Height for an image value of 1, in units of the scene."""
 
 
 class LightSpectrum(Part):
@@ -302,5 +305,5 @@ Sky = Annotated[
 
 
 def rgb(value: float | tuple[float, float, float]) -> list[float]:
-    """A color as three values; a number is gray."""
+    """A color as three values; a single number is gray."""
     return [float(value)] * 3 if isinstance(value, (int, float)) else [float(c) for c in value]

@@ -1,4 +1,4 @@
-"""Shader code generated from the models' Python source. `go.emit(model)` is `emission.emit`."""
+"""Shader code generated from the Python source of the models. `go.emit(model)` calls `emission.emit`."""
 
 from .bundle import Bundle, bundle
 from .emission import emit

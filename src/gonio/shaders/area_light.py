@@ -12,15 +12,17 @@ from .placement import Placement
 TITLE = """Light that a surface reflects from a convex quadrilateral of uniform radiance 1, by linearly transformed
 cosines (Heitz2016a).
 
-wo and the corners are vectors from the point of the surface, in its local frame, +z the shading normal; wo has unit
-length. The corners lie in order around the light, either way; a light with one side is tested before. What is below
-the horizon is cut off. The tables are read over the roughness and sqrt(1 - cos theta)."""
+wo and the corners are vectors from the shaded point, in its local frame, in which +z is the shading normal; wo has unit
+length. The corners are given in clockwise or counterclockwise order; for a one-sided light, test its orientation before
+the call. The part of the light below the horizon is clipped. The tables are read over the roughness and
+sqrt(1 - cos theta)."""
 
 
 def area_light(baked: Baked, lang: str, placement: Placement | None = None) -> Bundle:
     """The function `area_light` as shader code, with the tables of `energy.tables.ltc`.
 
-    The function takes `roughness` if the tables have this axis, and `f0` if they serve any Schlick reflectance.
+    The function has the argument `roughness` if the tables have this axis, and `f0` if they apply to any reflectance
+    F0.
     """
     inverse, norm = (Table(name, baked.arrays[name]) for name in ("ltc_inverse", "ltc_norm"))
     anisotropic, colored = inverse.channels == 8, norm.channels == 3

@@ -1,4 +1,4 @@
-"""A shader with all that a program needs to use it: text, manifest, tables."""
+"""A shader with everything that a program needs in order to use it: text, manifest and tables."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from .textures import pixels
 class Bundle:
     """The result of `bundle`.
 
-    text      the shader: structs, helpers, functions; no version line, no main
+    text      the shader: structs, helpers and functions, without a version line and main function
     manifest  the interface of the shader: plain dicts, lists, numbers; see docs/emit.md
     tables    uniform name -> float32 or float16 array in the order of upload (x fastest), channels last
     """
@@ -68,9 +68,9 @@ def bundle(
     placement: Placement | None = None,
     **own: Unpack[OwnKeywords],
 ) -> Bundle:
-    """Shader, manifest and tables of a material, or of several in one module; arguments as in `go.emit`.
+    """Shader, manifest and tables of a material, or of several in one module; the arguments are those of `go.emit`.
 
-    on         paths of weights that stay fields of a lean shader although they are switched off
+    on         paths of weights that remain fields of a lean shader although they are switched off
     arrays     whether numbered derived constants are written as arrays; the viewer passes them to pixels one by one
     placement  prefix of the names, group and first number of the bindings, file format of the tables
     own        fields of `OwnValues`
@@ -98,13 +98,13 @@ def _file(
     place: Placement,
     own: OwnValues,
 ) -> Bundle:
-    """A standalone file, which contains its tables."""
+    """A self-contained file, including its tables."""
     if place.prefix or place.first_binding or place.tables or place.half:
-        what = f"a prefix, a binding or a form of tables given, but a {language.name} file stands alone"
-        raise InputError(what, "emit: lang", "import it under a name")
+        what = f"a prefix, a binding or a table format given, but a {language.name} file is self-contained"
+        raise InputError(what, "emit: lang", "omit these options; import the file under a name of your choice")
     if len(models) != 1:
-        what = f"{len(models)} materials given, but a {language.name} file holds one"
-        raise InputError(what, "emit: lang", "write a file for each")
+        what = f"{len(models)} materials given, but a {language.name} file contains one"
+        raise InputError(what, "emit: lang", "write one file per material")
     made, numbers = _recorded(models[0], functions, own, (), single=False)
     names = Names(made, language)
     text = python_file(made, names, numbers)

@@ -32,7 +32,7 @@ def curves_bundle(
     The manifest has the additional key `errors`: the largest and the mean error of each function.
     """
     made = [(written(curve), _types(curve)) for curve in curves if curve.swept or curve.angle]
-    low = f"roughness from {fits.LEAST_ROUGHNESS:g} and cosines from {fits.LEAST_COSINE:g}; below, the values there."
+    low = f"roughness from {fits.LEAST_ROUGHNESS:g} and cosines from {fits.LEAST_COSINE:g}; constant below."
     text = "\n".join([*textwrap.wrap(title, 105), f"Fits of order {order}, for {low}", *errors(curves)])
     bundle = functions_bundle(made, lang, text, placement)
     bundle.manifest["errors"] = {curve.name: {"max": curve.error, "mean": curve.mean} for curve in curves}
@@ -55,7 +55,8 @@ def _types(curve: Curve) -> dict[str, str | None]:
 
 
 def written(curve: Curve) -> Callable:
-    """A curve as a function written in the vocabulary (`gonio.ops`), of a roughness and a cosine or of one of them."""
+    """A curve as a function of a roughness and a cosine, or of one of them, written with the operations of
+    `gonio.ops`."""
 
     def part(fitted: Rational, roughness: Scalar, cos_theta: Scalar) -> Scalar:
         return fitted(*fits.variables(fitted.forms, roughness, cos_theta))

@@ -1,4 +1,4 @@
-"""The expressions of a routine as text, re-nested, with values named as in Python where a name helps."""
+"""The expressions of a routine as nested text; some values have names, as in Python."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .source import returned_by
 from .syntax import AND, ATOM, CHOICE, OPERATORS, OR, SIGN, SUM
 from .values import SIZES, Member, Record, Routine, Value, stem_of
 
-INLINE = 88  # characters; a longer part of an expression gets a separate line
-# selections of existing values, which never get a separate line
+INLINE = 88  # number of characters above which a part of an expression is written on a separate line
+# selections of existing values, which are never written on a separate line
 SELECTED = ("parameter", "constant", "component", "swizzle", "element")
 
 
 class ExpressionWriter(ParameterWriter):
-    """Writes the expressions of one routine, with the names of its parameters and local values."""
+    """Writes the expressions of one routine with the names of its parameters and local values."""
 
     def _name_for(self, value: Value) -> str:
         if value.op == "call" and isinstance(value.type, Routine):
@@ -68,7 +68,7 @@ class ExpressionWriter(ParameterWriter):
         """The text of a value on the right-hand side of a statement."""
         text = self.expression(value, root=True)[0]
         if self.language.templates and value.op in ("lt", "le", "and", "or") and "," not in text:
-            # without a comma, these comparisons cannot be parsed as a template
+            # if there is no comma, these comparisons cannot be parsed as a template
             text = re.sub(r"(?<![\w!])\(([\w.]+ <=? [\w.]+)\)", r"\1", text)
         return text
 
@@ -78,11 +78,11 @@ class ExpressionWriter(ParameterWriter):
         return f"({text})" if mine < level or (strict and mine == level) else text
 
     def expression(self, value: Value, root: bool = False) -> tuple[str, int]:
-        """(text, precedence) of a value: its name if it has one, else its expression."""
+        """(text, precedence) of a value: the name of the value if it has one, else its expression."""
         if not root and value.order in self.locals:
             return self.locals[value.order], ATOM
         text, level = self.compose(value)
-        if not root and len(text) > INLINE and value.op not in (*SELECTED, "call"):  # a call is broken at its commas
+        if not root and len(text) > INLINE and value.op not in (*SELECTED, "call"):  # calls are broken at commas
             name = self.fresh(self._name_for(value))
             self.lines += self.wrapped(self.language.local(self.names.note(value.type), name, text))
             self.locals[value.order] = name
@@ -131,7 +131,7 @@ class ExpressionWriter(ParameterWriter):
         return template.format(*parts, prefix=self.names.placement.prefix), ATOM
 
     def _components(self, value: Value) -> list[str]:
-        """An argument of a vector's constructor, component by component if the language requires it."""
+        """An argument of a vector constructor, as separate components if the language requires them."""
         if self.language.swizzles or value.type not in SIZES:
             return [self.unparenthesized(value)]
         vector, letters = value, "xyzw"[: SIZES[value.type]]
@@ -152,12 +152,12 @@ class ExpressionWriter(ParameterWriter):
     def infix(self, value: Value) -> tuple[str, int]:
         symbol, level = OPERATORS[value.op]
         a, b = value.args
-        # the order of evaluation is that of the source: a + (b + c) keeps its parentheses
+        # the order of evaluation is that of the source, so a + (b + c) has parentheses
         strict = value.op not in ("and", "or")
         chain = level == SUM and a.order not in self.locals and OPERATORS.get(a.op, ("", ATOM))[1] == SUM
         left = self.compose(a)[0] if chain else self.part(a, level)  # a long sum is wrapped, not split
         right = self.part(b, level, strict)
-        if level in (AND, OR):  # && inside || gets parentheses for readability
+        if level in (AND, OR):  # && inside || is parenthesized for readability
             left, right = (
                 f"({text})"
                 if other.op in ("and", "or") and other.op != value.op and other.order not in self.locals
@@ -184,7 +184,7 @@ class ExpressionWriter(ParameterWriter):
         return template.format(*parts, prefix=self.names.placement.prefix), CHOICE if infix else ATOM
 
     def splat(self, value: Value, type_: str, level: int = CHOICE) -> str:
-        """The text of a value, converted to a vector if it is a float and a vector is needed."""
+        """The text of a value; a float is converted to a vector if a vector is needed."""
         if value.type == type_ or value.type not in ("float",) or not type_.startswith("vec"):
             return self.part(value, level)
         if value.op == "constant":
@@ -248,9 +248,9 @@ class ExpressionWriter(ParameterWriter):
         return texts
 
     def _array(self, member: Member, parts: list[str], initializer: bool = False) -> str:
-        """An array from the texts of its entries: an existing one that holds them, or a new one.
+        """An array from the texts of its entries: an existing array that contains them, or a new one.
 
-        initializer  whether the text stands in the braces of a declaration
+        initializer  whether the text is inside the braces of a declaration
         """
         stem = parts[0].removesuffix("[0]") if self.language.whole_members or not initializer else ""
         if self.arrays.get(stem) == len(parts) and parts == [f"{stem}[{index}]" for index in range(len(parts))]:
@@ -264,7 +264,7 @@ class ExpressionWriter(ParameterWriter):
         return local
 
     def member_texts(self, record: Record, values: Sequence[Value | None]) -> list[str]:
-        """The texts of a struct's members from the values of its fields; None for a field that is not read."""
+        """The texts of a struct's members, from the values of its fields; None for a field that is not read."""
         texts = []
         for member in self.names.members(record):
             parts = [
@@ -285,7 +285,7 @@ class ExpressionWriter(ParameterWriter):
         return "0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM))
 
     def object(self, struct: Struct, fields: dict[str, tuple[Value, bool]]) -> str:
-        """A struct as an argument: this function's own if it holds exactly these fields, else a new one."""
+        """A struct as an argument: this function's own struct if it contains exactly these fields, else a new one."""
         name = struct.record.name
         if name in self.objects:
             own = self.objects[name][1]

@@ -15,12 +15,12 @@ SMALLEST, LARGEST = 1.2e-38, 3.4e38  # range of normal float32 numbers other tha
 
 
 def folded(recorded: graph.Graph, values: Mapping[str, Any]) -> dict[graph.Node, Numbers]:
-    """The nodes of all functions that have the same value in every call if the parameters have these values.
+    """The nodes of all functions that have the same value in every call if the parameters have the given values.
 
-    values  name of the entry's parameter, such as "self.alpha" -> a number, or a list of components
+    values  name of a parameter of the entry, such as "self.alpha" -> a number, or a list of components
     """
     known: dict[graph.Node, Any] = {}
-    agreed: dict[graph.Function, list[Any]] = {}  # by callee, its arguments that are the same in all calls so far
+    agreed: dict[graph.Function, list[Any]] = {}  # for each callee, the arguments that are equal in all calls so far
     entry = recorded.functions[-1]
     for node in _parameters(entry):
         if node.static in values:
@@ -46,7 +46,7 @@ def _parameters(function: graph.Function) -> list[graph.Node]:
 
 
 def _agree(agreed: dict[graph.Function, list[Any]], callee: graph.Function, arguments: list[Any]) -> None:
-    """Keep the arguments that are the same in this call as in all earlier ones."""
+    """Keep the arguments that are the same in this call and in all earlier calls."""
     pairs = zip(agreed.get(callee, arguments), arguments, strict=True)
     agreed[callee] = [a if a is not None and b is not None and np.array_equal(a, b) else None for a, b in pairs]
 
@@ -68,7 +68,7 @@ def _value(node: graph.Node, arguments: list[Any], known: Mapping[graph.Node, An
 
 
 def _numbers(node: graph.Node, value: Any) -> Numbers:
-    """The components of a value in 32 bits; empty if one of them cannot be represented."""
+    """The components of a value in single precision; empty if one of them cannot be represented."""
     array = np.ravel(np.asarray(value))
     if array.dtype == bool:
         return tuple(map(bool, array))

@@ -1,4 +1,4 @@
-"""Functions in the vocabulary that are not methods of a material, as shader code: table lookups, fits, area lights."""
+"""Functions that are not methods of a material, as shader code: table lookups, fits, area lights."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ Functions = Sequence[tuple[Callable, Mapping[str, str | None]]]
 
 
 class _Plain(Routines):
-    """The routines of plain functions, each of which is an entry."""
+    """The routines of plain functions, each of which is an entry point."""
 
     def __init__(self, functions: Functions, single: bool) -> None:
         kinds = {name: kind for _, types in functions for name, kind in types.items() if kind is not None}
 
         def every(**arguments: object) -> tuple[object, ...]:
-            """The driver of a recording; not part of the shader."""
+            """Calls all functions in a recording; not part of the shader."""
             return tuple(
                 function(*(arguments[name] if kind else None for name, kind in types.items()))
                 for function, types in functions
@@ -52,8 +52,8 @@ class _Plain(Routines):
 def functions_bundle(functions: Functions, lang: str, title: str, placement: Placement | None = None) -> Bundle:
     """Functions as shader code, with their tables.
 
-    functions  pairs of a function marked `@function` and the types of its arguments: name -> "float", "vec3", ...; or
-               None for an argument that is None and shapes the code
+    functions  pairs of a function decorated with `@function` and the types of its arguments: name -> "float", "vec3",
+               ..., or None for an argument that is None and determines the code
     title      the comment at the beginning of the text
     The manifest has the keys lang, shader, functions, operations and textures of a material's manifest.
     Raises InputError for a language that writes Python files.
@@ -61,7 +61,7 @@ def functions_bundle(functions: Functions, lang: str, title: str, placement: Pla
     language, place = Language.family.get(str(lang)), placement or Placement()
     place.check(language)
     if language.standalone:
-        what = f"{language.name} given, a shader language expected: a Python file holds a whole material"
+        what = f"{language.name} given, a shader language expected: a Python file contains a whole material"
         raise InputError(what, "emit: lang", "such as glsl, wgsl or hlsl")
     made = _Plain(functions, language.single)
     names = Names(made, language, place)

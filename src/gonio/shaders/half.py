@@ -17,16 +17,16 @@ from .read_back import Array, parameters, recorded, values_of
 from .vectors import pairs
 
 PAIRS = 65_536
-BATCH = 4_096  # rows at a time: evaluating a recording may hold an array for each operation
-UNCHANGED = 1e-9  # smaller errors are rounding errors in 64 bits
-DIM = 1e-6  # errors of smaller values are relative to this
+BATCH = 4_096  # rows per evaluation, because evaluating a recording may need one array per operation
+UNCHANGED = 1e-9  # errors below this are rounding errors of double precision
+DIM = 1e-6  # errors of smaller values are relative to this value
 SEED = 0
 
 Errors: TypeAlias = dict[str, dict[str, float]]
 
 
 def bounded(made: Bundle, models: Sequence[BSDF]) -> Bundle:
-    """A shader with half-precision tables, whose manifest and header state the errors of half precision."""
+    """The shader with half-precision tables, whose manifest and header state the errors of half precision."""
     manifests = made.manifest.get("materials", [made.manifest])
     lines = []
     for manifest, model in zip(manifests, models, strict=True):
@@ -38,12 +38,13 @@ def bounded(made: Bundle, models: Sequence[BSDF]) -> Bundle:
 
 def errors(model: BSDF, manifest: Mapping[str, Json]) -> dict[str, Json]:
     """The largest and the mean relative error of `eval` and `pdf` if tables or single parameters are rounded to half
-    precision; all arithmetic is in 64 bits.
+    precision; all arithmetic is in double precision.
 
-    Measured for 65,536 pairs from `vectors.pairs`, half of them with random parameters (`read_back.parameters`). The
-    error is that of the worst channel, relative to the largest channel of the pair, or to 1e-6 if that is larger.
-    Returns {"pairs": 65536, "tables": {"eval": {"max", "mean"}, ...} or None without tables, "parameters": the same by
-    path, with tables of 32 bits}.
+    The errors are measured for 65,536 pairs from `vectors.pairs`, half of them with random parameter values
+    (`read_back.parameters`). The error of a pair is the largest error of its channels, divided by the largest channel
+    of the pair, or by 1e-6 if that is larger.
+    Returns {"pairs": 65536, "tables": {"eval": {"max", "mean"}, ...} or None if there are no tables, "parameters": the
+    same by path, for tables in single precision}.
     """
     names = [name for name in ("eval", "pdf") if name in manifest["functions"]]
     wo, wi = pairs(np.random.default_rng(SEED), PAIRS, bool(model.transmits))
@@ -77,7 +78,7 @@ def _stacked(channels: Sequence[Array]) -> Array:
 
 
 def _errors(reference: Mapping[str, Array], changed: Mapping[str, Array]) -> Errors:
-    """The largest and the mean error of each function, where the reference is finite."""
+    """The largest and the mean error of each function, over pairs for which the reference is finite."""
     result = {}
     for name, exact in reference.items():
         error = np.abs(changed[name] - exact).max(0) / np.maximum(np.abs(exact).max(0), DIM)
@@ -87,20 +88,20 @@ def _errors(reference: Mapping[str, Array], changed: Mapping[str, Array]) -> Err
 
 
 def described(manifest: Mapping[str, Json]) -> str:
-    """A sentence that states the errors, for the shader's header."""
+    """A sentence for the shader's header that states the errors."""
     half = manifest["half"]
 
     def listed(of: Errors) -> str:
         return ", ".join(f"{name} {one['max']:.1e} (mean {one['mean']:.1e})" for name, one in of.items())
 
-    parts = [f"tables, as here, {listed(half['tables'])}"] if half["tables"] else []
+    parts = [f"tables (as here) {listed(half['tables'])}"] if half["tables"] else []
     single = half["parameters"]
     changing = [path for path, of in single.items() if max((one["max"] for one in of.values()), default=0) > UNCHANGED]
     parts += [f"{path} {listed(single[path])}" for path in changing]
     if len(changing) < len(single):
         parts.append("other parameters none")
     return (
-        f"Largest errors of {manifest['title']} over {half['pairs']:,} pairs if these are stored in 16 bits: "
+        f"Largest errors of {manifest['title']} over {half['pairs']:,} pairs caused by 16-bit storage: "
         + "; ".join(parts)
-        + ". The arithmetic needs 32 bits."
+        + ". All arithmetic requires 32 bits."
     )

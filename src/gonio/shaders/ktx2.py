@@ -1,4 +1,4 @@
-"""Tables as KTX 2.0 textures, the container that engines load into Vulkan, WebGPU and WebGL."""
+"""Tables as KTX 2.0 textures, a container format that engines load into Vulkan, WebGPU and WebGL."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from .._version import __version__
 
 IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
-# VkFormat by bytes of a channel and number of channels: R16_SFLOAT, R16G16_SFLOAT, ... (Vulkan specification, VkFormat)
+# VkFormat by the bytes and the number of channels: R16_SFLOAT, R16G16_SFLOAT, ... (Vulkan specification, VkFormat)
 FORMATS = {(2, 1): 76, (2, 2): 83, (2, 4): 97, (4, 1): 100, (4, 2): 103, (4, 4): 109}
 CHANNELS = (0, 1, 2, 15)  # red, green, blue, alpha of the color model RGBSDA
 SIGNED_FLOAT = 0x80 | 0x40  # qualifiers of a sample
-RGBSDA, UNSPECIFIED, LINEAR = 1, 0, 1  # color model; primaries, as a table has no colors; transfer function
+RGBSDA, UNSPECIFIED, LINEAR = 1, 0, 1  # color model; primaries (a table has no colors); transfer function
 HEAD = 12 + 9 * 4 + 4 * 4 + 2 * 8 + 3 * 8  # identifier, header, index, and the index of one level
 
 
 def ktx2(texels: NDArray[np.floating]) -> bytes:
     """An uncompressed KTX 2.0 file from (rows, columns, channels) or (layers, rows, columns, channels) float32 or
-    float16, with 1, 2 or 4 channels: a 2D or 3D texture of one level.
+    float16, with 1, 2 or 4 channels: a 2D or 3D texture with one level.
 
-    Source: "KTX File Format Specification 2.0", and for the descriptor "Khronos Data Format Specification 1.3",
+    Sources: "KTX File Format Specification 2.0" and, for the descriptor, "Khronos Data Format Specification 1.3",
     khronos.org.
     """
     *depth, height, width, count = texels.shape

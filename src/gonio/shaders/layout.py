@@ -12,7 +12,7 @@ def comment(doc: str) -> list[str]:
 
 
 def wrap(line: str, indent: str, hang: str = INDENT) -> list[str]:
-    """A statement in lines of at most `COLUMNS` characters, broken at the loosest operators.
+    """A statement in lines of at most `COLUMNS` characters, broken at the operators of lowest precedence.
 
     indent  indentation of the first line
     hang    additional indentation of all other lines
@@ -23,7 +23,7 @@ def wrap(line: str, indent: str, hang: str = INDENT) -> list[str]:
 
 
 def _break(text: str) -> int | None:
-    """The position of a line break: at the last of the shallowest operators or commas before the last column."""
+    """The position of a line break: at the last of the least nested operators or commas before the last column."""
     depth, best = 0, None
     for i, c in enumerate(text[: COLUMNS + 1]):
         if c in "([{":

@@ -21,9 +21,9 @@ from .program import Program
 from .textures import axes, width
 from .values import SIZES
 
-Json: TypeAlias = Any  # a value that a JSON file may hold
+Json: TypeAlias = Any  # a value that a JSON file may contain
 
-# symbols of parameters in papers
+# symbols of the parameters in papers
 SYMBOLS = {
     "alpha": "\u03b1",
     "eta": "\u03b7",
@@ -59,7 +59,7 @@ def manifest(made: Program, names: Names, numbers: Mapping[str, Json], bindings:
     ]
     terms = made.entries.get("terms")
     derived = made.derived
-    facts = made.bound  # describes the code, whose parameters may change
+    facts = made.bound  # its properties hold for any values of the shader's parameters
     return {
         "version": 1,
         "lang": language.name,
@@ -165,7 +165,7 @@ def numbers_of(model: BSDF) -> Iterator[tuple[str, Value]]:
             widest = {"spectrum": 3, "alpha": 2}.get(parameter.kind, 1)
             if array.ndim > 1 or array.size not in (1, widest) or (array.ndim == 1 and widest == 1):
                 what = "one value per ray given, a single value expected"
-                raise InputError(what, location, "the shader's struct holds one material")
+                raise InputError(what, location, "the shader's struct describes one material")
             if np.any(np.abs(array) > np.finfo(np.float32).max):
                 raise InputError(
                     f"{np.abs(array).max():g} given, at most 3.4e38 expected", location, "shaders use float32"

@@ -1,4 +1,4 @@
-"""Routines in languages without operators, where `a.add(b)` stands for a + b, and tables as functions of nodes."""
+"""Routines in languages without operators, in which a + b is written `a.add(b)` and tables are functions of nodes."""
 
 from __future__ import annotations
 

@@ -19,9 +19,9 @@ from .text import Block
 
 
 class Module:
-    """A text to which shaders are added one by one.
+    """A text to which shaders are added one at a time.
 
-    head    the comment at its beginning
+    head    the comment at the beginning of the text
     blocks  the declarations
     tables  name of the uniform -> table
     """
@@ -35,7 +35,7 @@ class Module:
         self._bindings: dict[str, int] = {}  # by the name of a table's block
 
     def add(self, made: Program, numbers: Mapping[str, Json]) -> dict[str, Json]:
-        """Add a material's shader; returns its manifest.
+        """Add a material's shader and return its manifest.
 
         A name that is already declared differently, or that depends on such a name, is replaced by NAME_2.
 
@@ -68,7 +68,7 @@ class Module:
         return [*blocks, texts.values(made, names, numbers)] if self.constants else blocks
 
     def _numbered(self, made: Program, names: Names) -> dict[int, int]:
-        """The binding of each table: its existing one, or the next."""
+        """The binding of each table: the existing binding, or the next free one."""
         bindings: dict[int, int] = {}
         following = self.placement.first_binding + len(self._bindings)
         for table in made.tables:
@@ -82,7 +82,7 @@ class Module:
         return bindings
 
     def _conflicts(self, written: list[Block]) -> dict[str, str]:
-        """Names of a shader that mean something else in the module -> free names, or names of equal declarations."""
+        """Names of a shader that have another meaning in the module -> free names, or names of equal declarations."""
         used = {*self._declared, *(block.name for block in written)}
         renamed: dict[str, str] = {}
         decided = -1
@@ -92,7 +92,7 @@ class Module:
         return renamed
 
     def _rename(self, written: list[Block], used: set[str], renamed: dict[str, str]) -> None:
-        """Add the names that must be replaced if those in `renamed` are."""
+        """Add the names that must be replaced because those in `renamed` are replaced."""
         for block in written:
             others = self._declared.get(block.name, [])
             needed = set(re.findall(r"\w+", "\n".join(_code(block)))) & set(_words(renamed, self.placement.prefix))
@@ -100,7 +100,7 @@ class Module:
                 renamed[block.name] = self._another(block, used | set(renamed.values()), renamed)
 
     def _another(self, block: Block, used: set[str], renamed: Mapping[str, str]) -> str:
-        """The first of NAME_2, NAME_3, ... that declares the same or is free."""
+        """The first of NAME_2, NAME_3, ... whose declaration is the same or that is free."""
         for count in itertools.count(2):
             name = f"{block.name}_{count}"
             words = _words({**renamed, block.name: name}, self.placement.prefix)
@@ -111,7 +111,7 @@ class Module:
         raise AssertionError("endless")
 
     def _clash(self, block: Block, other: Block) -> bool:
-        """Whether two declarations of one name cannot be in one module."""
+        """Whether two declarations of the same name cannot coexist in a module."""
         if self._same(block, other):
             return False
         overloaded = block.kind == other.kind == "function" and self.language.overloads
@@ -122,7 +122,7 @@ class Module:
 
 
 def _words(renamed: Mapping[str, str], prefix: str) -> dict[str, str]:
-    """Words of a text -> replacements; a table's include those of its texture and the functions that read it."""
+    """Words of a text -> replacements; for a table, these include its texture and the functions that read it."""
     words = {}
     for name, other in renamed.items():
         words[prefix + name] = prefix + other
@@ -148,7 +148,7 @@ def _equal_tables(block: Block, other: Block) -> bool:
 
 
 def _code(block: Block) -> list[str]:
-    """The lines of a declaration without comments, and of a table without the binding, which the module chooses."""
+    """The lines of a declaration without comments; for a table, without the binding, which the module chooses."""
     lines = [line.partition("//")[0].rstrip() for line in block.lines]
     return [line for line in lines if line][block.kind == "table" :]
 
@@ -160,7 +160,7 @@ def _types(block: Block) -> list[str]:
 
 
 def of_several(manifests: list[dict[str, Json]], language: Language) -> dict[str, Json]:
-    """The manifest of a module: those of all materials, and all textures."""
+    """The manifest of a module: the manifests of all materials, and all textures."""
     textures = {texture["uniform"]: texture for each in manifests for texture in each["textures"]}
     shader = "materials" + language.suffix
     return {

@@ -1,4 +1,4 @@
-"""The global names of a shader: those of routines, and of the constants and structs that they use."""
+"""The global names of a shader: those of its routines, and those of the constants and structs that the routines use."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CONSTANTS = {"PI": math.pi, "TWO_PI": 2.0 * math.pi, "INV_PI": 1.0 / math.pi, "I
 
 
 class Names:
-    """Names in the shader of a program.
+    """The names in a program's shader.
 
     routines   name of each routine
     constants  name -> (number, description)
@@ -50,7 +50,7 @@ class Names:
                 self.routines[routine] = self.public(name)
 
     def public(self, name: str) -> str:
-        """A global name as written: with the prefix, and replaced if another shader of the module has it."""
+        """A global name as it is written: with the prefix, and replaced if another shader of the module uses it."""
         return self.placement.prefix + self.renamed.get(name, name)
 
     def constant(self, name: str) -> str:
@@ -58,8 +58,7 @@ class Names:
         return self.public(self.language.word(name))
 
     def table(self, table: Table, start: str = "") -> str:
-        """The public name of a table, or with a `start` of "table_", "lookup_" or "fetch_" that of its texture or
-        function."""
+        """The public name of a table or, if `start` is "table_", "lookup_" or "fetch_", of its texture or function."""
         stem = self.renamed.get(f"table_{table.name}", f"table_{table.name}").removeprefix("table_")
         return f"{self.placement.prefix}{start}{stem}"
 
@@ -72,16 +71,16 @@ class Names:
         return self.public(self.language.word(record.name))
 
     def members(self, record: Record) -> list[Member]:
-        """The members by which a struct is declared and constructed."""
+        """The members with which a struct is declared and constructed."""
         return members(record.fields, record.arrays and self.program.arrays)
 
     def declared(self, member: Member, name: str = "") -> tuple[str, str]:
-        """(type, name) of the declaration of a member, or of a function's parameter under the given name."""
+        """(type, name) in the declaration of a member, or of a function's parameter with the given name."""
         type_, name = self.language.type(member.type), name or self.language.word(member.name)
         return self.language.array_declaration(type_, name, member.length) if member.length else (type_, name)
 
     def access(self, record: Record, index: int) -> tuple[str, str, int]:
-        """(how a field is selected, such as "c[3]", its member's name, and that member's count)."""
+        """(expression that selects a field, such as "c[3]"; name of the field's member; length of the member)."""
         member = next(m for m in reversed(self.members(record)) if m.first <= index)
         name = self.language.word(member.name)
         return (f"{name}[{index - member.first}]" if member.length else name), name, member.length
@@ -101,7 +100,7 @@ class Names:
         return first_free(name, used)
 
     def _types(self, routine: Routine) -> tuple[object, ...]:
-        """The types that distinguish overloads: those of the written arguments, with the struct of an object."""
+        """The types that distinguish overloads: those of the written arguments, with the struct for an object."""
         arguments = self.program.recorded[routine].arguments
         struct_of = functools.cache(lambda root: self.program.struct_of(arguments.get(root)))
         types: dict[object, object] = {}
@@ -113,7 +112,7 @@ class Names:
         return tuple(types.values())
 
     def _distinguished(self, name: str, routine: Routine) -> str:
-        """The name with the flag or word that a copy was recorded for: "masking_shadowing_transmits"."""
+        """The name, extended by the flag or word for which a copy was recorded: "masking_shadowing_transmits"."""
         first = next(r for r, known in self.routines.items() if known == name)
         if first.source != routine.source:
             return name
@@ -126,7 +125,7 @@ class Names:
         return name
 
     def _same_doc(self, name: str, routine: Routine) -> bool:
-        """Whether all routines of a name come from one function of the source, with different types."""
+        """Whether all routines with a name come from one function of the source and differ only in types."""
         return all(self.routines[r] != name or r.source == routine.source for r in self.routines)
 
     def note(self, record: Kind) -> str:
@@ -139,7 +138,7 @@ class Names:
         return self.language.type(record)
 
     def number(self, value: Value) -> str:
-        """A constant by its name if it has one, else as a literal."""
+        """A constant, written as its name if it has one, else as a literal."""
         number = float(value.static)
         if self.language.single:
             check_single(number, value.source)

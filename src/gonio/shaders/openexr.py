@@ -1,4 +1,4 @@
-"""Tables as OpenEXR images, for OSL and for engines; without Mitsuba, which shaders do not need."""
+"""Tables as OpenEXR images, for OSL and for engines, written without Mitsuba, because shaders do not require it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 CHANNELS = {1: "Y", 2: "RG", 4: "RGBA"}
-TYPES = {2: 1, 4: 2}  # of a channel, by its bytes: half, float
+TYPES = {2: 1, 4: 2}  # type of a channel by its size in bytes: half, float
 
 
 def openexr(pixels: NDArray[np.floating]) -> bytes:
@@ -17,7 +17,7 @@ def openexr(pixels: NDArray[np.floating]) -> bytes:
     Source: "OpenEXR File Layout", openexr.com.
     """
     height, width, count = pixels.shape
-    order = sorted(zip(CHANNELS[count], range(count), strict=True))  # a file has its channels in alphabetical order
+    order = sorted(zip(CHANNELS[count], range(count), strict=True))  # channels are in alphabetical order
     kind = struct.pack("<iIii", TYPES[pixels.dtype.itemsize], 0, 1, 1)
     channels = b"".join(name.encode() + b"\0" + kind for name, _ in order) + b"\0"
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
@@ -40,6 +40,6 @@ def openexr(pixels: NDArray[np.floating]) -> bytes:
     offsets = first + (8 + size) * np.arange(height, dtype="<u8")
     rows = (
         pixels[..., [place for _, place in order]].transpose(0, 2, 1).astype(pixels.dtype.newbyteorder("<"))
-    )  # channel after channel
+    )  # one channel after another
     lines = [struct.pack("<2i", y, size) + row.tobytes() for y, row in enumerate(rows)]
     return header + offsets.tobytes() + b"".join(lines)

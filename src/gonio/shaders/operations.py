@@ -17,10 +17,10 @@ OF = {op: kind for kind, ops in KINDS.items() for op in ops}
 
 
 def operations(routine: Routine) -> dict[str, int]:
-    """Operations on numbers, including those of called functions.
+    """The number of operations on numbers by kind, including those of called functions.
 
-    An operation on a vector counts once per component, and a dot product as its products and sums; signs and absolute
-    values are free. The two sides of a selection are counted, as a GPU computes both.
+    An operation on a vector counts once per component, and a dot product counts as its products and sums; sign changes
+    and absolute values are free. Both sides of a selection are counted, because a GPU computes both.
     """
     total = _count(routine, {})
     return {kind: total[kind] for kind in KINDS}

@@ -18,9 +18,9 @@ class OwnKeywords(TypedDict, total=False):
 class OwnValues:
     """Options for the use of a material's own values in its shader.
 
-    lean       omit code that they switch off, such as a coat of weight 0
-    constants  also write them, as a constant of the material's struct
-    fold       write them into the code, where expressions of them alone become numbers
+    lean       omit code that these values switch off, such as a coat of weight 0
+    constants  also write these values, as a constant of the type of the material's struct
+    fold       write these values into the code, in which expressions that depend on them alone become numbers
     """
 
     lean: bool = False

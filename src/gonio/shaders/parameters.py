@@ -1,4 +1,4 @@
-"""The parameters of a routine: the arguments of the written function, and the names of values in it."""
+"""The parameters of a routine: the arguments of the written function, and the names of the values in the function."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .values import Member, Record, Routine, Value, members
 
 
 class ParameterWriter:
-    """Names the parameters of one routine, and gives its local values names that do not collide with them."""
+    """Names the parameters of one routine, and chooses names for its local values that do not collide with them."""
 
     def __init__(self, names: Names, routine: Routine) -> None:
         self.names, self.routine, self.language = names, routine, names.language
@@ -51,7 +51,7 @@ class ParameterWriter:
                 self._plain(member, given[member.first : member.first + max(member.length, 1)])
 
     def _members(self, parameters: Sequence[Value]) -> list[Member]:
-        """The arguments that hold the parameters."""
+        """The arguments that contain the parameters."""
         return members([(flat(p.static), p.type) for p in parameters], self.program.arrays)
 
     def _plain(self, member: Member, parameters: list[Value]) -> None:

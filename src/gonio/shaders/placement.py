@@ -1,4 +1,4 @@
-"""The place of a shader in a module with other code: the prefix of its names, the bindings and files of its tables."""
+"""Options for combining a shader with other code: the prefix of its names, the bindings and files of its tables."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class PlacementKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Placement:
-    """The place of a shader in a module.
+    """Options for combining a shader with other code.
 
-    prefix         start of all global names: functions, structs, constants, tables
+    prefix         prefix of all global names: functions, structs, constants, tables
     group          binding group of the tables: WGSL's `@group`, HLSL's register space, a descriptor set
     first_binding  binding number of the first table
-    tables         format of table files: "raw", "exr" or "ktx2"; "" is the language's default, mostly "raw"
+    tables         format of the table files: "raw", "exr" or "ktx2"; "" is the language's default, mostly "raw"
     half           whether tables have 16 bits per number
     """
 
@@ -53,9 +53,11 @@ class Placement:
             what = f"group {self.group} given, but {language.title or language.name} has no groups of bindings"
             raise InputError(what, f"{LOCATION}: group", "leave it out, or choose wgsl, hlsl, slang or glsl-vulkan")
         if self.tables and self.tables not in CHOICES:
-            raise InputError(f"unknown form '{self.tables}'", f"{LOCATION}: tables", did_you_mean(self.tables, CHOICES))
+            raise InputError(
+                f"unknown format '{self.tables}'", f"{LOCATION}: tables", did_you_mean(self.tables, CHOICES)
+            )
         if self.tables and language.tables not in CHOICES:
-            what = f"{self.tables} given, but {language.title or language.name} reads tables in its own form"
+            what = f"{self.tables} given, but {language.title or language.name} reads tables in its own format"
             raise InputError(what, f"{LOCATION}: tables", "leave it out")
 
     def form(self, language: Language) -> str:
@@ -63,11 +65,11 @@ class Placement:
         return self.tables or language.tables
 
     def suffix(self, language: Language) -> str:
-        """The suffix of the name of a table's file."""
+        """The suffix of the names of table files."""
         form = self.form(language)
         return ".f16" if self.half and form == "raw" else FORMATS[form].suffix
 
     @property
     def bits(self) -> int:
-        """Bits of a number in a table."""
+        """The number of bits of a number in a table."""
         return 16 if self.half else 32

@@ -1,8 +1,9 @@
-"""Functions of the vocabulary that shader languages lack or compute too inaccurately, written in the vocabulary itself.
+"""Functions of `gonio.ops` that shader languages lack or compute too inaccurately, written with other functions of
+`gonio.ops`.
 
-They are recorded like a model's functions, so one text serves every language. The languages guarantee little: GLSL ES
-3.00 and WGSL allow sin, cos, exp, log and atan an absolute error of 2^-11 or several units in the last place, which
-later operations cannot correct.
+They are recorded like a model's functions, so one source suffices for all languages. The accuracy that the languages
+guarantee is low: GLSL ES 3.00 and WGSL allow an absolute error of 2^-11, or several units in the last place, for sin,
+cos, exp, log and atan. Later operations cannot correct such errors.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ _ERF_TAIL = (0.00017747548, 1.1277497, 0.63705957, 0.104037508, -0.022277163, 0.
 
 
 def erf(x: Scalar) -> Scalar:
-    """Error function: a polynomial near 0, 1 - exp of a polynomial beyond; error under 1e-7."""
+    """Error function: a polynomial near 0, 1 - exp of a polynomial elsewhere; error below 1e-7."""
     size = ops.minimum(abs(x), 4.0)
     center = size < 1.0
     value = where(center, x * _horner(sqr(x), _ERF_CENTER), 1.0 - ops.exp(-_horner(size, _ERF_TAIL)))
@@ -67,7 +68,7 @@ def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
 
 
 def sine_quarters(x: Scalar, quarters: float) -> Scalar:
-    """sin(x + quarters pi / 2) by Taylor series within an eighth of a turn: error 1e-7, against 5e-4 for a GPU's."""
+    """sin(x + quarters pi / 2) by Taylor series within an eighth of a turn; error 1e-7 (up to 5e-4 for a GPU's sin)."""
     count = floor(x * (2.0 / ops.pi) + 0.5)  # whole quarter turns
     r = (x - count * QUARTER_TURN) - count * QUARTER_REST
     r2 = sqr(r)
@@ -81,7 +82,7 @@ def sine_quarters(x: Scalar, quarters: float) -> Scalar:
 
 
 def exponent(x: Scalar) -> Value:
-    """e of x = m 2^e, 1 <= m < 2, for x > 0, from its bits."""
+    """e of x = m 2^e, 1 <= m < 2, for x > 0, from the bits of x."""
     return graph.emit("exponent", "float", x)
 
 
@@ -91,9 +92,9 @@ def scaled(x: Scalar, e: Scalar) -> Value:
 
 
 def log(x: Scalar) -> Scalar:
-    """Natural logarithm of a normal float32 > 0: relative error 1e-7, also near 1, where a GPU's is at best 5e-7.
+    """Natural logarithm of a normal float32 > 0; relative error 1e-7, even near 1, where that of a GPU is at best 5e-7.
 
-    x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)). Colors are computed by channel.
+    For x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)). Colors are computed per channel.
     """
     if isinstance(x, graph.Node) and x.type != "float":
         value: Value = graph.emit("vector", x.type, *(ops.log(channel) for channel in _channels(x)))
@@ -109,7 +110,7 @@ def log(x: Scalar) -> Scalar:
 
 
 SQRT_2 = 1.4142135
-LOG_2 = 0.693359375  # with few bits, so that e LOG_2 is exact
+LOG_2 = 0.693359375  # log 2 rounded to few bits, so that e LOG_2 is exact
 LOG_2_REST = -0.00021219444
 
 _SINE_QUARTERS = ops.function(sine_quarters)

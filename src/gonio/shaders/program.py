@@ -1,8 +1,8 @@
 """A model as the functions, structs and tables of a shader, independent of the language.
 
 All methods are recorded into one graph, so that eval, pdf and sample share functions. Quantities that depend on the
-parameters alone (`BSDF.derive`) become a separate function, whose result the others take as an argument: a shader
-computes it once per draw instead of once per pixel.
+parameters alone (`BSDF.derive`) become a separate function, whose result is an argument of the others: a shader
+computes it once per draw call instead of once per pixel.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from .values import Record, Routine, Value, shape
 
 FUNCTIONS = ("eval", "pdf", "sample", "terms")
 
-# descriptions of the functions that a program calls
+# descriptions of the entry points
 ENTRIES = {
-    "derive": "quantities that depend on the parameters alone: call it once per draw",
+    "derive": "quantities that depend on the parameters alone: call it once per draw call",
     "eval": "the BSDF times |cos theta_i|, RGB, 1/sr",
-    "pdf": "density with which `sample` chooses wi, 1/sr",
+    "pdf": "density with which `sample` generates wi, 1/sr",
     "sample": "wi, its weight eval / pdf, its pdf; u: three random numbers in [0, 1)",
     "terms": "the factors of eval, for inspection",
 }
 
 
 class Struct:
-    """An argument made of fields: the parameters of a model, or quantities derived from them."""
+    """An argument that consists of fields: the parameters of a model, or quantities derived from them."""
 
     def __init__(
         self,
@@ -53,11 +53,11 @@ class Routines:
     """The content from which the text of a shader is written.
 
     routines  in order of definition, callees first
-    entries   name -> the routine that a program calls
+    entries   name -> entry point, a routine that a program calls
     recorded  the recording of each routine
     bound     the material with symbols as parameters, if there is one
-    tables    the tables that are read
-    readings  for each table, by identity, how it is read: "lookup" or "fetch"
+    tables    the tables that the routines read
+    readings  for each table, by identity, the operations that read it: "lookup" or "fetch"
     arrays    whether numbered constants are written as arrays
     """
 
@@ -93,13 +93,14 @@ class Routines:
         return self._parameters[key]
 
     def derived_of(self, value: object) -> Struct | None:
-        """The struct of the quantities derived from a model's parameters; also for the dict itself."""
+        """The struct of the quantities derived from a model's parameters; `value` is the model or the dict of
+        quantities."""
         key = tuple(derived_list(value))
         return self._derived.get(key)
 
     @property
     def _with_derived(self) -> object:
-        """An argument that holds the derived values of the whole model."""
+        """An argument that contains the derived values of the whole model."""
         for method, routine in self.entries.items():
             if method != "derive":
                 return self.recorded[routine].arguments["self"]
@@ -107,7 +108,7 @@ class Routines:
 
     @property
     def derived(self) -> Struct | None:
-        """The struct that the entries take in addition to the parameters."""
+        """The struct that is an argument of the entry points in addition to the parameters."""
         return self.derived_of(self._with_derived) if "derive" in self.entries else None
 
     # ------------------------------------------------------------------ contents
@@ -133,7 +134,7 @@ class Routines:
             name = "".join(part[:1].upper() + part[1:] for part in routine.name.split("_")) + "Result"
         fields = [(_result_name(path, value), value.type) for path, value in routine.results]
         doc = inspect.getdoc(type(result)) or "" if hasattr(result, "_fields") else ""
-        arrays = not hasattr(result, "_fields")  # named fields keep their names
+        arrays = not hasattr(result, "_fields")  # the names of named fields are preserved
         routine.record = Record(name, fields, doc.partition("\n")[0], dict(listed(doc)), arrays)
 
     def _tables(self) -> list[Table]:
@@ -152,10 +153,10 @@ class Program(Routines):
     """The parts of a model's shader.
 
     entries   method -> its routine, including "derive" if there is something to derive
-    structs   of parameters, derived values and results, in order of use
-    without   paths of parameters that are off and shape the code
-    single    whether it is for a language of float32 values, which lacks some functions of the vocabulary
-    values    values of the parameters, by path, if these are folded into the code; None if they are not
+    structs   structs of parameters, derived values and results, in order of use
+    without   paths of parameters that are switched off, on which the code depends
+    single    whether the program is for a language of float32 values, which lacks some functions of `gonio.ops`
+    values    values of the parameters, by path, if they are folded into the code; else None
     """
 
     bound: BSDF
@@ -184,7 +185,7 @@ class Program(Routines):
         self.tables = self._tables()
 
     def _trim_derived(self) -> None:
-        """Make one struct for each structure of derived values, with the fields that are used."""
+        """Create one struct for each structure of derived values, with the fields that are used."""
         used: dict[tuple, set[str]] = {}
         owner: dict[tuple, str] = {}
         for routine in self.routines:
@@ -204,13 +205,13 @@ class Program(Routines):
             if fields and key in owner:
                 name = graph.first_free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
                 by = f"{graph.class_name(self.model)}_derive"
-                doc = f"Quantities that depend on the parameters alone: {by} computes them, once per draw."
+                doc = f"Quantities that depend on the parameters alone: {by} computes them, once per draw call."
                 self._derived[key] = Struct(name, fields, doc, arrays=True)
         derive = self.entries.get("derive")
         if derive is None:
             return
         struct = self._derived.get(tuple(derived_list(self._with_derived)))
-        if struct is None:  # none of its fields is used
+        if struct is None:  # none of the fields is used
             del self.entries["derive"]
             self.routines.remove(derive)
             return
@@ -218,17 +219,17 @@ class Program(Routines):
         derive.results = [(path, by_path[path]) for path in struct.paths]
         derive.used = {derive.parameters.index(v) for v in derive.values() if v.op == "parameter"}
         derive.record, derive.single = struct.record, False
-        self.routines = self._reachable(self.routines)  # without routines that only unused fields needed
+        self.routines = self._reachable(self.routines)  # without routines that only unused fields require
 
 
 def recorded(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Graph:
     """A recording of functions of a material whose parameters are symbols; it returns their results in order.
 
-    single  whether the recording is for a language of float32 values, which lacks some functions of the vocabulary
+    single  whether the recording is for a language of float32 values, which lacks some functions of `gonio.ops`
     """
 
     def every(self: BSDF, wo: Direction, wi: Direction, u: Direction) -> tuple[object, ...]:
-        """The driver of a recording; not part of the shader."""
+        """Calls all functions in a recording; not part of the shader."""
         if any(inner.derives for _, inner in tree.walk(self)):
             self = settle(self, derive(self))
         return tuple(getattr(self, method)(wo, u if method == "sample" else wi) for method in functions)
@@ -239,17 +240,17 @@ def recorded(bound: BSDF, functions: tuple[str, ...], single: bool) -> graph.Gra
 
 @ops.function
 def derive(self: BSDF) -> dict[str, object]:
-    """Quantities that depend only on the parameters: computed once, not for every pair of directions."""
+    """Quantities that depend only on the parameters; computed once, not for every pair of directions."""
     return _derive(self)
 
 
 def _derive(material: BSDF) -> dict[str, object]:
-    """The derived quantities of every material of the tree, by its path."""
+    """The derived quantities of every material of the tree, by path."""
     return {path: inner.derive() for path, inner in tree.walk(material) if inner.derives}
 
 
 def settle(material: BSDF, derived: dict[str, object], path: str = "") -> BSDF:
-    """A copy of a bound material whose tree holds the result of `derive`."""
+    """A copy of a bound material whose tree contains the result of `derive`."""
     below = {name: settle(inner, derived, tree.join(path, name)) for name, inner in tree.children(material).items()}
     return binding.bound_copy(material, below, derived.get(path))
 
@@ -302,7 +303,7 @@ def parameter_docs(model: BSDF) -> Iterator[tuple[str, str]]:
 
 
 def listed(doc: str) -> Iterator[tuple[str, str]]:
-    """(name, description) in a docstring's list of lines "name  description", continued by indented lines."""
+    """(name, description) for each line "name  description" of a docstring; indented lines continue a description."""
     name, text = "", ""
     for line in doc.splitlines():
         entry = re.match(r"(\w+)  +(\S.*)", line)
@@ -321,7 +322,7 @@ def check(model: object, functions: str | Sequence[str], location: str) -> tuple
     """Return the requested functions without repetition, and without "terms" if the model has none.
 
     functions  names in a sequence, or in one string separated by commas
-    location   the place that errors name
+    location   the location that errors state
     Raises InputError for an unknown function, and for a model that cannot be written as shader code.
     """
     if not isinstance(model, BSDF):
@@ -340,7 +341,7 @@ def check(model: object, functions: str | Sequence[str], location: str) -> tuple
     random = stochastic(model)
     if random is not None:
         what = f"{type(random).__name__} is estimated by random walks and cannot be written as shader code"
-        raise InputError(what, location, "KullaConty is its closed form")
+        raise InputError(what, location, "use KullaConty, which has a closed form")
     available = tuple(name for name in asked if name != "terms" or model.has_terms)
     if not available:
         raise InputError(f"{type(model).__name__} has no terms D, G, F", location, "give eval, pdf or sample")
@@ -356,13 +357,13 @@ def stochastic(model: BSDF) -> BSDF | None:
 
 
 def written_from(model: object) -> str:
-    """A description of the source of a material's code: the class's Python source, or the shader that was read."""
+    """A description of the source of a material's code: the Python source of the class, or the shader that was read."""
     shader = getattr(type(model), "program", None)
     return f"the shader {shader.where}" if shader else "its Python source"
 
 
 def choices(model: BSDF) -> list[tuple[str, Value]]:
-    """(path, value) of each choice that shapes the code: classes of materials, options and flags."""
+    """(path, value) of each choice on which the code depends: classes of materials, options and flags."""
     return [
         *((path, type(inner).__name__) for path, inner in tree.walk(model) if path),
         *((leaf.path, leaf.value) for leaf in tree.leaves(model) if not leaf.parameter.numeric),

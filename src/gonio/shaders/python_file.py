@@ -64,8 +64,8 @@ def _head(made: Program, language: Python) -> list[str]:
         *(["", *textwrap.wrap("With " + ", ".join(shaped) + ".", 105)] if shaped else []),
         "",
         "wo points to the viewer, wi to the light: arrays (..., 3) of unit vectors of the local frame, away from the",
-        "surface; +z is the shading normal. Colors are linear RGB. Parameters are keywords, arrays with one entry per",
-        f"pair or numbers; DEFAULTS has the values that are used otherwise. {language.precision}",
+        "surface; +z is the shading normal. Colors are linear RGB. Parameters are keyword arguments: numbers or",
+        f"arrays with one entry per pair; DEFAULTS contains the default values. {language.precision}",
     ]
 
 

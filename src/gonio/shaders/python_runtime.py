@@ -4,7 +4,7 @@ from __future__ import annotations
 
 VECTOR = '''
 class Vector:
-    """Two to four numbers, or arrays of them, such as the directions of many pairs: v.x, v.xy."""
+    """A vector of two to four numbers or arrays, such as the directions of many pairs: v.x, v.xy."""
 
     __array_ufunc__ = None  # NumPy leaves the operators to this class
     __hash__ = None
@@ -71,7 +71,7 @@ class Vector:
 
 
 def _each(function):
-    """The function for each component of vectors."""
+    """Apply the function to each component of vectors."""
     def apply(*arguments):
         size = max((len(a.parts) for a in arguments if isinstance(a, Vector)), default=0)
         if not size:
@@ -131,7 +131,7 @@ def _tables(shapes, *text):
 
 
 def _texels(table, at, like):
-    """The channels at whole coordinates."""
+    """The channels at integer coordinates."""
     axes, channels = table
     index = 0
     for place, count in zip(at, axes):
@@ -141,7 +141,7 @@ def _texels(table, at, like):
 
 
 def lookup(table, *at):
-    """Values between texel centers, linear in each coordinate in [0, 1], clamped outside."""
+    """Values interpolated linearly between texel centers, at coordinates in [0, 1], which are clamped."""
     cells, places = [], []
     for x, count in zip(at, table[0]):
         position = minimum(maximum(x * float(count) - 0.5, 0.0), count - 1.0)
@@ -159,7 +159,7 @@ def lookup(table, *at):
 
 
 def fetch(table, *at):
-    """Values of the texel at whole coordinates, clamped outside."""
+    """Values of the texel at integer coordinates, which are clamped."""
     return _texels(table, [_integers(minimum(maximum(x, 0.0), n - 1.0)) for x, n in zip(at, table[0])], at[0])
 '''
 
@@ -175,7 +175,7 @@ def _arguments(parameters, *directions):
 
 
 def _field(value, kind, like):
-    """A parameter: a color (..., 3), two widths (..., 2), an angle in radians as (cos, sin), or a number."""
+    """A parameter: a color (..., 3), two alphas (..., 2), an angle in radians as (cos, sin), or a number."""
     value = _numbers(value, like)
     if kind == "angle":
         return Vector(cos(value), sin(value))
@@ -190,7 +190,7 @@ def _field(value, kind, like):
 
 
 def _result(value, *like):
-    """An array per pair, and of a vector (..., 3); a struct field by field."""
+    """A result as arrays: one entry per pair, (..., 3) for a vector; a struct is converted field by field."""
     if isinstance(value, tuple):
         return type(value)(*(_result(part, *like) for part in value))
     parts = value.parts if isinstance(value, Vector) else (value,)

@@ -1,4 +1,4 @@
-"""A routine as a Python function: the expressions of the shader languages with Python's operators."""
+"""A routine as a Python function: the same expressions as in the shader languages, with Python's operators."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ class PythonWriter(RoutineWriter):
         return [f"{INDENT}{start} (", *wrap(text, 2 * INDENT), f"{INDENT})"]
 
     def infix(self, value: Value) -> tuple[str, int]:
-        """In Python comparisons bind more loosely than & and |, and are parenthesized as their operands."""
+        """Comparisons have lower precedence than & and | in Python and are therefore parenthesized as their
+        operands."""
         a, b = value.args
         symbol = OPERATORS[value.op][0]
         if value.op in COMPARE:

@@ -1,11 +1,11 @@
-"""The round trip: a material is written as shader text, the text is read again, and the values are compared in 64 bits.
+"""The round trip: a material is written as shader text, the text is read, and the values are compared in float64.
 
     made = bundle(material, "wgsl")
     Original(material, made, wo, wi, u).difference(made)
 
-The reference is the recording from which the text was written, in NumPy, with its constants and tables rounded to 32
-bits as in the text. Only the order of additions may differ, so that a difference beyond rounding in 64 bits is an error
-of the writer or of the reader.
+The reference is the recording from which the text was written, evaluated in NumPy, with its constants and tables
+rounded to single precision as in the text. Only the order of additions may differ, so a difference beyond rounding
+errors of double precision is a fault of the writer or of the reader.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from . import program as programs
 from .bundle import Bundle
 from .manifest import Json
 
-LANGUAGES = ("glsl", "hlsl", "wgsl")  # those that are read
-TINY = 1e-100  # in 64 bits, smaller values may be remains of underflow
+LANGUAGES = ("glsl", "hlsl", "wgsl")  # the languages that can be read
+TINY = 1e-100  # smaller values in double precision may be caused by underflow
 Array = NDArray[np.float64]
 
 
 class Difference(NamedTuple):
-    """The largest difference of a function, relative to the larger of the two values, with its row and these values."""
+    """The largest difference of a function, relative to the larger of the two values, with its row and both values."""
 
     function: str
     figure: float
@@ -47,12 +47,12 @@ class Difference(NamedTuple):
 
 
 class Original:
-    """The values of a material's recording, with which the values of its texts are compared.
+    """The values of a material's recording, with which the values of shader texts are compared.
 
     made    a shader of the material, in any language that can be read back
     wo, wi  directions, (N, 3)
     u       random numbers, (N, 3)
-    seed    seed of the random parameter values of half of the rows, see `parameters`
+    seed    seed of the random parameter values in half of the rows; see `parameters`
     """
 
     def __init__(self, material: BSDF, made: Bundle, wo: Array, wi: Array, u: Array, seed: int = 0) -> None:
@@ -66,7 +66,7 @@ class Original:
     def difference(self, made: Bundle) -> list[Difference]:
         """The largest relative difference of each function of the text.
 
-        Raises InputError for text that cannot be read; MachineError without a compiler for GLSL and HLSL.
+        Raises InputError for text that cannot be read, and MachineError if there is no compiler for GLSL and HLSL.
         """
         with np.errstate(all="ignore"):
             read = _read(_module(made.text, made.manifest["lang"]), made, list(self.values), self.given, self.fields)
@@ -74,11 +74,11 @@ class Original:
 
 
 def parameters(manifest: Mapping[str, Json], count: int, seed: int) -> dict[str, Array]:
-    """Values of each field of the struct, by path: `count` rows, (N,) or (components, N), in 32 bits.
+    """Values of each field of the struct, by path: `count` rows, (N,) or (components, N), in single precision.
 
-    Even rows have the material's values, odd rows random ones: a fifth at the ends of the range, half close to its
-    lower end, where code has other branches. An open range extends to twice or half the value. Parameters on which
-    tables depend keep their values.
+    Even rows have the material's values, odd rows have random values: a fifth are at the ends of the range, and half
+    are close to its lower end, where code has other branches. An open range extends to twice or half the value.
+    Parameters on which tables depend are unchanged.
 
     seed  seed of the random values
     """
@@ -119,7 +119,7 @@ def _largest(name: str, written: list[Array], read: list[Array], count: int) -> 
     return worst
 
 
-# ---------------------------------------------------------------------- what is read
+# ---------------------------------------------------------------------- the text
 
 
 def _module(text: str, language: str) -> Module:
@@ -138,7 +138,7 @@ def _read(
 
     def formula(**symbols: Any) -> tuple[tuple[Any, ...], ...]:
         machine = Machine(module, {}, textures)
-        for start in module.function("main"):  # of GLSL; it assigns the initial values of globals
+        for start in module.function("main"):  # in GLSL, it assigns the initial values of globals
             machine.call(start, ())
         split = {name: _components(symbol) for name, symbol in symbols.items()}
         structs = [tuple(split[name] for name in columns)] if columns else []
@@ -160,14 +160,15 @@ def _read(
 
 
 def _components(symbol: graph.Node) -> Any:
-    """A vector in the machine's form: a tuple of numbers."""
+    """A vector as a tuple of numbers, as in `spirv.machine`."""
     if symbol.type == "float":
         return symbol
     return tuple(getattr(symbol, letter) for letter in "xyz"[: int(symbol.type[-1])])
 
 
 def _one(module: Module, made: Bundle, method: str) -> Function:
-    """The function of a method; among overloads, as in a mix of mixes, the one that takes the material's struct."""
+    """The function of a method; among overloads, as in a mix of mixes, the one whose argument is the material's
+    struct."""
     name = made.manifest["functions"][method]
     candidates = module.function(name)
     if len(candidates) > 1:
@@ -180,7 +181,7 @@ def _one(module: Module, made: Bundle, method: str) -> Function:
 def _called(
     machine: Machine, module: Module, function: Function, structs: list[Any], more: list[Any]
 ) -> tuple[Any, ...]:
-    """A function's result as numbers; a function without parameters or derived values takes fewer structs."""
+    """A function's result as numbers; a function that needs no parameters or derived values has fewer structs."""
     names = [module.names.get(id, "") for id, _ in function.parameters]
     offered = dict(zip(("self", "derived"), structs, strict=False))
     offered["material"] = offered.get("self")
@@ -188,13 +189,13 @@ def _called(
     return tuple(numeric(leaf) for leaf in leaves(machine.call(function, arguments)))
 
 
-# ---------------------------------------------------------------------- what was written
+# ---------------------------------------------------------------------- the recording
 
 
 def recorded(material: BSDF, names: Sequence[str], bits: int = 32, without: Sequence[str] = ()) -> graph.Graph:
-    """The recording of a material's functions, with constants of 32 bits and tables of 32 or 16.
+    """The recording of a material's functions, with 32-bit constants and tables of 32 or 16 bits.
 
-    without  paths of parameters that are off and shape the code, as in `Program`
+    without  paths of parameters that are switched off, on which the code depends, as in `Program`
     """
     tables: dict[int, Table] = {}
     made = programs.recorded(recording.symbols(material, without), tuple(names), True)
@@ -214,7 +215,7 @@ def recorded(material: BSDF, names: Sequence[str], bits: int = 32, without: Sequ
 def values_of(
     made: graph.Graph, names: Sequence[str], given: Mapping[str, Array], fields: Mapping[str, Array]
 ) -> dict[str, list[Array]]:
-    """The values of a recording's functions, component by component.
+    """The values of a recording's functions, by component.
 
     given   values of the arguments, by name
     fields  values of the parameters, by path
@@ -225,7 +226,7 @@ def values_of(
 
 
 def _fold(node: graph.Node) -> None:
-    """Replace an operation on numbers alone by its result, which the text contains as one 32-bit number."""
+    """Replace an operation whose arguments are all numbers by its result, which is one 32-bit number in the text."""
     node.args = tuple(arg.static if isinstance(arg, graph.Node) and arg.op == "constant" else arg for arg in node.args)
     if node.op == "mul" and node.type == "float" and 0.0 in [arg for arg in node.args if isinstance(arg, float)]:
         node.op, node.args, node.static = "constant", (), 0.0  # of `zeros_like` and `ones_like`
@@ -235,17 +236,17 @@ def _fold(node: graph.Node) -> None:
 
 
 def _single(value: object) -> object:
-    """A number in 32 bits."""
+    """A number in single precision."""
     return float(np.float32(value)) if isinstance(value, float) else value
 
 
 def _rounded(table: Table, bits: int) -> Table:
-    """A table in 32 or 16 bits."""
+    """A table with 32 or 16 bits per number."""
     return Table(table.name, table.values.astype(f"f{bits // 8}").astype(float))
 
 
 def _numbers(value: object) -> list[Array]:
-    """The numbers of a result, in order; vectors component by component."""
+    """The numbers of a result in order; a vector contributes its components."""
     return list(_each(value))
 
 

@@ -10,15 +10,15 @@ from .names import Names
 from .program import place
 from .values import ELEMENTWISE, Routine, Value, needed
 
-COMPUTED = ELEMENTWISE | {"call", "where", "texel"}  # get a line if a component of them is selected
+COMPUTED = ELEMENTWISE | {"call", "where", "texel"}  # on a separate line if a component is selected
 
 
 class RoutineWriter(ExpressionWriter):
-    """Writes one routine: which values get a line, their names, and the text of each."""
+    """Writes one routine: decides which values are separate lines, and writes their names and texts."""
 
     def __init__(self, names: Names, routine: Routine) -> None:
         super().__init__(names, routine)
-        self.named: set[int] = set()  # orders of the values that get a line
+        self.named: set[int] = set()  # orders of the values that are separate lines
 
     def text(self) -> list[str]:
         """The lines of the routine."""
@@ -42,7 +42,7 @@ class RoutineWriter(ExpressionWriter):
         return [*self.lines, *result]
 
     def doc(self) -> str:
-        """The docstring, without entries of arguments that shaped the code and are not arguments of the function."""
+        """The docstring, without entries for arguments that are not arguments of the written function."""
         entry = self.routine in self.program.entries.values()
         given = {place(p.static)[0] for i, p in enumerate(self.routine.parameters) if entry or i in self.routine.used}
         lines, dropping = [], False
@@ -85,7 +85,7 @@ class RoutineWriter(ExpressionWriter):
         return called if same else None
 
     def _plan(self, values: list[Value]) -> None:
-        """Decide which values get a line and a name."""
+        """Decide which values have a line and a name."""
         uses: dict[int, int] = {}
         for value in values:
             for argument in needed(value):
@@ -118,7 +118,7 @@ class RoutineWriter(ExpressionWriter):
             self.named.discard(called.order)
 
     def _last_uses(self, statements: list[Value]) -> dict[int, int]:
-        """Index of the last statement that reads each named value; the result counts as the last statement."""
+        """The index of the last statement that reads each named value; the result counts as the last statement."""
         last: dict[int, int] = {}
         roots = [(index, needed(value)) for index, value in enumerate(statements)]
         roots.append((len(statements), [value for _, value in self.routine.results]))
@@ -140,7 +140,7 @@ class RoutineWriter(ExpressionWriter):
         type_ = self.names.note(value.type)
         wanted = self.language.word(self._name_for(value))
         name = self._reusable(wanted, value, index, last_use)
-        if name:  # as in Python, a name is assigned again once its old value is no longer used
+        if name:  # as in Python, a name is reassigned once its old value is no longer used
             if name in self.first_lines:
                 line = self.first_lines[name]
                 self.lines[line] = self.language.changeable(self.lines[line])
@@ -153,7 +153,7 @@ class RoutineWriter(ExpressionWriter):
         self.locals[value.order] = name
 
     def _reusable(self, wanted: str, value: Value, index: int, last_use: dict[int, int]) -> str:
-        """A variable of the wanted name whose value is no longer needed, or ""."""
+        """A variable with the wanted name whose value is no longer needed, or ""."""
         number = 1
         while (name := wanted if number == 1 else f"{wanted}_{number}") in self.used_names:
             holder = self.holders.get(name)
@@ -164,7 +164,7 @@ class RoutineWriter(ExpressionWriter):
 
 
 def _size(value: Value, sizes: dict[int, int]) -> int:
-    """Number of operations in an expression, without selections."""
+    """The number of operations in an expression, without selections."""
     if value.op in ("parameter", "constant"):
         return 0
     below = sum(sizes.get(a.order, 0) for a in needed(value))

@@ -1,8 +1,8 @@
 """Simplification of recorded functions for readable shader text.
 
-A recording holds every operation of the Python code. Here equal values are merged, constants are folded, branches that
-cannot be taken are removed, and a selection inside another one by the same mask is resolved: `where(b == 0, 0,
-a / where(b == 0, 1, b))` becomes a quotient that is selected only where b is not 0.
+A recording contains every operation of the Python code. This module merges equal values, folds constants, removes
+branches that cannot be taken, and resolves a selection inside another selection by the same mask:
+`where(b == 0, 0, a / where(b == 0, 1, b))` becomes a quotient that is selected only where b is not 0.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ def routines(
 ) -> list[Routine]:
     """All functions of a recording, simplified, callees first.
 
-    folded   nodes that are numbers, as `folding.folded` finds them
-    guarded  keep a selection inside another one by the same mask, which makes the gradient of the unused branch finite
+    folded   nodes that are numbers, as determined by `folding.folded`
+    guarded  preserve a selection inside another one by the same mask, so that the gradient of the unused branch is
+             finite
     """
     known: dict[graph.Function, Routine] = {}
     for function in recorded.functions:
@@ -47,7 +48,7 @@ class _Simplifier:
         self.table: dict[tuple, Value] = {}
         self.count = 0
         self.assumed: dict[tuple, Value] = {}
-        self.parts: dict[int, tuple[Value, ...]] = {}  # components of a vector, as Python composed it
+        self.parts: dict[int, tuple[Value, ...]] = {}  # components of a vector, as composed in Python
         self.routine = Routine(function)
         self.values: dict[graph.Node, Value] = {}
         for node in function.nodes:
@@ -64,7 +65,7 @@ class _Simplifier:
             if value.op == "parameter":
                 self.routine.used.add(self.routine.parameters.index(value))
 
-    # ------------------------------------------------------------------ making values
+    # ------------------------------------------------------------------ construction of values
 
     def make(self, op: str, type_: Kind, args: tuple = (), static: Static = None, name: str = "") -> Value:
         key = (op, type_ if isinstance(type_, str) else id(type_), tuple(a.order for a in args), _key(static), name)
@@ -218,7 +219,7 @@ class _Simplifier:
             return args[0].args[0]
         if op == "not" and args[0].op == "not":
             return args[0].args[0]
-        if op in ("ne", "lt", "gt") and args[0] is args[1]:  # no source tests for NaN this way
+        if op in ("ne", "lt", "gt") and args[0] is args[1]:  # sources do not use this as a NaN test
             return self.constant(False, type_)
         if op in ("and", "or"):
             for a, b in (args, args[::-1]):
@@ -292,7 +293,7 @@ class _Simplifier:
         return None
 
     def _equal_up_to_constant(self, mask: Value, a: Value, b: Value) -> Value | None:
-        """mask ? x + 1 : x + 2 as x + (mask ? 1 : 2), else None."""
+        """mask ? x + 1 : x + 2 as x + (mask ? 1 : 2); None for other values."""
         numbers = []
         for value in (a, b):
             if value.op not in ("add", "sub") or value.name or value.args[1].op != "constant":
@@ -304,7 +305,7 @@ class _Simplifier:
         return self.build("add", (a.args[0], self.build("where", (mask, *numbers), numbers[0].type)), a.type)
 
     def assume(self, value: Value, mask: Value, holds: bool) -> Value:
-        """The value under the assumption that `mask` holds, or that it does not."""
+        """The value under the assumption that `mask` is true (`holds`) or false."""
         key = (value.order, mask.order, holds)
         result = self.assumed.get(key)
         if result is None:
@@ -319,7 +320,7 @@ class _Simplifier:
             if chosen.type == value.type:
                 return self.assume(chosen, mask, holds)
         if value.name or value.op in ("call", "element", "texel", "parameter", "constant"):
-            return value  # shared with other lines: a second copy would cost more than the selection
+            return value  # shared with other lines, so a second copy would cost more than the selection
         args = tuple(self.assume(a, mask, holds) for a in value.args)
         if all(new is old for new, old in zip(args, value.args, strict=True)):
             return value
@@ -348,5 +349,5 @@ def _compute(op: str, numbers: list) -> Static:
     try:
         with np.errstate(all="raise", under="ignore"):
             return graph.NUMPY[op](*numbers)
-    except FloatingPointError:  # left to the shader, as in the source
+    except FloatingPointError:  # not folded: computed by the shader, as in the source
         return None

@@ -1,4 +1,4 @@
-"""Names that are in the Python source but not in the recording: those of constants and of small helpers."""
+"""Names in the Python source that are not in the recording: those of constants and of small helper functions."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _comment_on(path: str, name: str) -> str | None:
 
 
 def returned_by(op: str, source: str, own: str) -> str:
-    """The name of the plain function that returned a value, if it was recorded as part of another; "" otherwise.
+    """The name of the plain function that returned a value, if it was recorded as part of another function; else "".
 
     source  the line that wrote the value, "file:line"
     own     the line of the function that contains it

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-# precedence of expressions, from the loosest
+# precedence of expressions, lowest first
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, SIGN, ATOM = range(9)
 
 OPERATORS = {

@@ -32,7 +32,7 @@ def _raw(texels: Texels) -> bytes:
 
 
 def _rows(texels: Texels) -> Texels:
-    """The layers stacked vertically, as an image has no third axis."""
+    """The layers stacked vertically, because an image has no third axis."""
     return texels.reshape(-1, *texels.shape[-2:])
 
 
@@ -41,7 +41,7 @@ def _picture(texels: Texels) -> bytes:
 
 
 def _mirrored(texels: Texels) -> bytes:
-    """An image whose rows are repeated in reverse order: renderers disagree about which row has t = 0."""
+    """An image whose rows are repeated in reverse order, because renderers differ in which row has t = 0."""
     rows = _rows(texels)
     return openexr(np.concatenate([rows, rows[::-1]]))
 
@@ -52,4 +52,4 @@ FORMATS = {
     "ktx2": TableFormat(".ktx2", ktx2),
     "exr-mirrored": TableFormat(".exr", _mirrored),  # for OSL
 }
-CHOICES = ("raw", "exr", "ktx2")  # open to users
+CHOICES = ("raw", "exr", "ktx2")  # the formats that users can select

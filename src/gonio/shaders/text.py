@@ -1,4 +1,4 @@
-"""The text of a shader: its head, and the blocks that declare one name each."""
+"""The text of a shader: its head, and blocks, each of which declares one name."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Block(NamedTuple):
     """The declaration of one name, or of one overload of a function.
 
     kind   "constant", "struct", "table", "function" or "values"
-    name   without prefix; for a table "table_NAME", which also stands for the functions that read it
+    name   name without prefix; for a table, "table_NAME", which also represents the functions that read it
     table  the table, if kind is "table"
     """
 
@@ -80,7 +80,7 @@ def _helpers(names: Names, bodies: Sequence[Block]) -> list[Block]:
 
 
 def _raw(names: Names, name: str) -> str:
-    """A public name without the prefix, as it was before it was replaced."""
+    """A public name without the prefix, before any replacement."""
     name = name.removeprefix(names.placement.prefix)
     return next((before for before, after in names.renamed.items() if after == name), name)
 
@@ -105,7 +105,7 @@ def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str
     rule = "linear between texel centers, " if "lookup" in readings else ""
     about = [
         f"// {size} texels, {channels}; {rule}clamped outside.",
-        f"// They are in {names.file(table)}, which an output folder (-o DIR/) holds beside the shader.",
+        f"// They are in {names.file(table)}, which an output folder (-o DIR/) contains next to the shader.",
     ]
     group = [names.placement.group] if language.groups else []
     dimension = 3 if len(axes(table)) == 3 else 2
@@ -117,7 +117,7 @@ def _table(made: Routines, names: Names, table: Table, binding: int) -> list[str
 
 
 def values(made: Program, names: Names, numbers: Mapping[str, Any]) -> Block:
-    """The material's own values as a constant of its struct; `numbers` holds them by path."""
+    """The material's own values as a constant of its struct; `numbers` contains them by path."""
     struct = made.struct_of(made.bound)
     assert struct is not None
     language = names.language
@@ -157,7 +157,7 @@ def head(made: Program, names: Names) -> list[str]:
 
 
 def costs(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
-    """The operations of each function by kind, in lines of a comment."""
+    """The number of operations of each function by kind, as lines of a comment."""
     parts = []
     for name, kinds in counts.items():
         listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)

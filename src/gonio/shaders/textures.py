@@ -10,7 +10,7 @@ from .names import Names
 
 
 def axes(table: Table) -> tuple[int, ...]:
-    """Texels along x, y, z of a table's texture: the last axis is x; groups of four channels are stacked last."""
+    """The texels along x, y, z of a table's texture: the last axis is x; groups of four channels are stacked last."""
     sizes = [*reversed(table.shape)]
     if groups(table) > 1:
         if len(sizes) == 3:
@@ -21,7 +21,7 @@ def axes(table: Table) -> tuple[int, ...]:
 
 
 def width(table: Table) -> int:
-    """Channels of a texel."""
+    """The number of channels of a texel."""
     return table.channels if table.channels in (1, 2) else 4
 
 
@@ -31,14 +31,13 @@ def groups(table: Table) -> int:
 
 
 def pixels(table: Table, bits: int = 32) -> np.ndarray:
-    """The texture's contents in the order of upload, x fastest, channels last; float32, or float16 for 16 bits.
+    """The contents of the texture in upload order (x fastest, channels last), as float32, or as float16 for 16 bits.
 
-    bits  32, or 16 for half precision
-    Raises InputError for numbers that overflow.
+    bits  bits per number: 32, or 16 for half precision Raises InputError for numbers that overflow.
     """
     number = np.dtype(f"f{bits // 8}")
     if np.abs(table.values).max(initial=0.0) > np.finfo(number).max:
-        what = f"table {table.name} holds {np.abs(table.values).max():g}, which {bits} bits cannot hold"
+        what = f"table {table.name} contains {np.abs(table.values).max():g}, which {bits} bits cannot represent"
         raise InputError(what, "emit: half", "write it in 32 bits")
     padded = np.zeros((*table.shape, groups(table) * width(table)))
     padded[..., : table.channels] = table.values
@@ -49,7 +48,7 @@ def pixels(table: Table, bits: int = 32) -> np.ndarray:
 def reader(names: Names, table: Table) -> list[str]:
     """The function that interpolates a table linearly between texel centers, clamped outside (`gonio.ops.table`).
 
-    Hardware filtering is too coarse: its weights have eight bits.
+    Hardware filtering is too inaccurate, because its weights have eight bits.
     """
     language = names.language
     letters, sizes, lines = _head(names, table, "lookup")
@@ -80,7 +79,7 @@ def reader(names: Names, table: Table) -> list[str]:
 
 
 def fetcher(names: Names, table: Table) -> list[str]:
-    """The function that reads one texel at integer coordinates, clamped outside (`gonio.ops.fetch`)."""
+    """The function that reads one texel at integer coordinates, which are clamped (`gonio.ops.fetch`)."""
     language = names.language
     _, sizes, lines = _head(names, table, "fetch")
     integer = language.type("int")
@@ -92,7 +91,8 @@ READERS = {"lookup": reader, "fetch": fetcher}
 
 
 def _head(names: Names, table: Table, how: str) -> tuple[list[str], dict[str, int], list[str]]:
-    """Names of the axes in the order of a lookup, slowest first; their sizes in texels; the function's first line."""
+    """The names of the axes in the order of a lookup, slowest first; their sizes in texels; the function's first
+    line."""
     language = names.language
     letters = list("xyz"[: len(table.shape)])
     channels = width(table)
@@ -104,7 +104,7 @@ def _head(names: Names, table: Table, how: str) -> tuple[list[str], dict[str, in
 
 
 def _texel(names: Names, table: Table, places: list[str]) -> str:
-    """A texel at coordinates along the axes, slowest first."""
+    """The texel at coordinates along the axes, slowest first."""
     at = places[::-1]
     if groups(table) > 1 and len(at) == 3:
         at[2] = f"group * {table.shape[0]} + {at[2]}"

@@ -1,4 +1,4 @@
-"""Cheaper forms of a material within a budget of operations, with their measured errors; split-sum code."""
+"""Approximations of a material within a budget of operations, with their measured errors; split-sum code."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .operations import operations
 from .placement import Placement
 from .program import Program
 
-TERMS = ("fresnel", "masking")  # choices that exist in cheaper forms
+TERMS = ("fresnel", "masking")  # choices for which less expensive options exist
 MAX_VARIANTS = 64
 PAIRS = 4096
 TABLE = 64
@@ -31,10 +31,10 @@ LOCATION = "emit: budget"
 
 
 class Tier(NamedTuple):
-    """A form of a material.
+    """The cost and the error of one form of a material or of `dfg`.
 
     name   description, such as "fresnel = schlick"
-    cost   operations of one call
+    cost   number of operations of one call
     error  largest error
     mean   mean error
     """
@@ -49,7 +49,7 @@ class Tier(NamedTuple):
 
 
 def cheapest(model: BSDF, budget: int) -> tuple[BSDF, list[Tier]]:
-    """(the form of a material whose `eval` is most accurate within a number of operations, all forms that were tried).
+    """(the form of a material with the most accurate `eval` within a number of operations, all forms that were tried).
 
     The forms differ in the choices of `TERMS`. Errors are those of `eval` for 4096 random pairs of directions, relative
     to the largest channel of each pair, or to 1e-3 of the mean if that is larger. The chosen form comes first.
@@ -78,7 +78,7 @@ def cheapest(model: BSDF, budget: int) -> tuple[BSDF, list[Tier]]:
 
 
 def _variants(model: BSDF) -> Iterator[tuple[str, BSDF]]:
-    """(description, material) of each combination of cheaper terms, the material itself first."""
+    """(description, material) of each combination of less expensive terms, the material itself first."""
     leaves = [leaf for leaf in tree.leaves(model) if leaf.path.rpartition(".")[2] in TERMS and leaf.parameter.choices]
     options = [[leaf.value, *(c for c in leaf.parameter.choices if c != leaf.value)] for leaf in leaves]
     for values in itertools.islice(itertools.product(*options), MAX_VARIANTS):
@@ -88,9 +88,9 @@ def _variants(model: BSDF) -> Iterator[tuple[str, BSDF]]:
 
 
 def _pairs(below: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of directions, half of them within the lobe of a mirror.
+    """Pairs of directions, half of which are close to the mirror direction.
 
-    below  whether half of the directions wi are mirrored to the other side, where light is transmitted
+    below  whether half of the directions wi are mirrored to the other side, for a material that transmits
     """
     u = r_sequence(PAIRS, 4, 0.5)
     z = np.sqrt(u[:, [0, 2]])
@@ -109,16 +109,16 @@ def _pairs(below: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget: int = 0) -> tuple[Bundle, list[Tier]]:
-    """Code of the split sum for a material's distribution: `dfg` and `image_light`; and the forms of `dfg`, the chosen
-    one first.
+    """The code of the split sum for a material's distribution, `dfg` and `image_light`; and the forms of `dfg`, the
+    chosen one first.
 
-    budget  operations of `dfg`: the most accurate of a table and several fits within this number is written; 0 for the
-            table. A lookup counts as its four texels and their interpolation
+    budget  number of operations of `dfg`: the most accurate of a table and several fits within this number is written;
+            0 selects the table. A lookup counts as its four texels and their interpolation
     Raises InputError for a material without a microsurface, and for an anisotropic one.
     """
     surface = model.microsurface
     if surface is None or not model.isotropic:
-        what = f"{type(model).__name__} has no split sum, which needs a distribution of one width"
+        what = f"{type(model).__name__} has no split sum, which requires an isotropic microfacet distribution"
         raise InputError(what, "emit: ibl", "--fit writes the albedo of any material")
     tiers = list(_forms(model, surface, budget))
     within = [(tier, code) for tier, code in tiers if not budget or tier.cost <= budget]
@@ -129,15 +129,15 @@ def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget
 
     @function
     def image_light(f0: Spectrum, roughness: Scalar, cos_theta: Scalar, radiance: Spectrum) -> Spectrum:
-        """Light that the surface reflects from an environment; `radiance` is that of the prefiltered environment."""
+        """Light that the surface reflects from an environment; `radiance` is read from the prefiltered environment."""
         ab = dfg(roughness, cos_theta)
         return (f0 * ab.x + ab.y) * radiance
 
     types: dict[str, str | None] = {"f0": "vec3", "roughness": "float", "cos_theta": "float", "radiance": "vec3"}
     title = (
         f"The split sum (Karis2013) of {surface.ndf}, {surface.masking}: light = (f0 A + B) radiance, where radiance\n"
-        "is that of the environment prefiltered for the roughness (gonio bake sky.hdr), in the mirrored direction.\n"
-        f"A and B by {best}."
+        "is read in the mirrored direction from the environment prefiltered for the roughness (gonio bake sky.hdr).\n"
+        f"A and B are computed by {best}."
     )
     made: Functions = [(dfg, {"roughness": "float", "cos_theta": "float"}), (image_light, types)]
     bundle = functions_bundle(made, lang, title, placement)
@@ -145,7 +145,7 @@ def split_sum(model: BSDF, lang: str, placement: Placement | None = None, budget
     return bundle, [best, *(tier for tier, _ in tiers if tier is not best)]
 
 
-LOOKUP = 30  # operations of an interpolated lookup of two channels, besides its four texels
+LOOKUP = 30  # operations of an interpolated lookup of two channels, in addition to its four texels
 
 
 def _forms(model: BSDF, surface: Microsurface, budget: int) -> Iterator[tuple[Tier, Callable]]:
@@ -154,7 +154,7 @@ def _forms(model: BSDF, surface: Microsurface, budget: int) -> Iterator[tuple[Ti
     table = Table("dfg", baked.arrays["dfg"])
 
     def dfg(roughness: Scalar, cos_theta: Scalar) -> object:
-        """A, B of the split sum: the albedo is F0 A + B for Schlick's Fresnel (Karis2013)."""
+        """A and B of the split sum: for Schlick's Fresnel term, the albedo is F0 A + B (Karis2013)."""
         return vec2(*lookup(table, roughness, cos_theta))
 
     samples = fits.sample(model, ("dfg",))

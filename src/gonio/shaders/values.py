@@ -14,7 +14,7 @@ from ..ops import graph
 SIZES = {"vec2": 2, "vec3": 3, "vec4": 4}
 COMPARE = {"lt", "le", "gt", "ge", "eq", "ne"}
 LOGIC = {"and", "or", "not"}
-MIN_ARRAY = 4  # numbers; fewer are easier to read by name
+MIN_ARRAY = 4  # smallest length of an array; fewer numbers are easier to read as separate names
 ELEMENTWISE = {"add", "sub", "mul", "div", "neg", "abs", "minimum", "maximum"}
 
 Kind: TypeAlias = Any  # type of a value: a name, or a `Record`
@@ -24,7 +24,8 @@ Static: TypeAlias = Any  # static part of a value: a number, a name, a routine, 
 class Value:
     """A value that a function computes.
 
-    op      as in a recording, or "constant", "parameter", "swizzle", "texel" (up to four channels of a table)
+    op      operation, as in a recording, or "constant", "parameter", "swizzle", "texel" (up to four channels of a
+            table)
     type    "float", "bool", "vec2", "vec3", "vec4", "bvec3", or the result of a call: a `Record`
     args    Values
     static  data of the operation: the constant, the parameter's path, the callee, the component or the letters of
@@ -47,7 +48,7 @@ class Record:
     """The type of several values returned together: a struct of the shader.
 
     docs    field -> description with unit and range
-    arrays  whether numbered fields may be written as an array: not in a struct that a program fills
+    arrays  whether numbered fields may be written as an array; False for a struct that a program fills
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class Member(NamedTuple):
     """A member of a struct or an argument of a function: a field, or `length` fields X_0, X_1, ... as an array X.
 
     first   index of its first field
-    length  0 for a field by itself
+    length  length of the array; 0 for a single field
     """
 
     name: str
@@ -79,7 +80,7 @@ class Member(NamedTuple):
 
 
 def members(fields: Sequence[tuple[str, Kind]], arrays: bool) -> list[Member]:
-    """The members that hold (name, type) fields; with `arrays`, runs of X_0, X_1, ... of one type are one member."""
+    """The members for (name, type) fields; with `arrays`, a run X_0, X_1, ... of one type is one member."""
     names = {name for name, _ in fields}
     result: list[Member] = []
     index = 0
@@ -103,7 +104,7 @@ class Routine:
 
     parameters  Values of op "parameter", with `static` the path ("self.base.alpha")
     results     a list of (path, Value); `single` if the result is one Value
-    used        indices of the parameters that the results depend on
+    used        indices of the parameters on which the results depend
     record      the struct type, if there are several results
     """
 
@@ -120,7 +121,7 @@ class Routine:
         return self.results[0][1].type if self.single else self.record
 
     def values(self) -> list[Value]:
-        """All values that the results depend on, in order of computation."""
+        """All values on which the results depend, in order of computation."""
         values: dict[int, Value] = {}
         pending = [value for _, value in self.results]
         while pending:
@@ -132,7 +133,7 @@ class Routine:
 
 
 def needed(value: Value) -> list[Value]:
-    """The arguments that a value depends on: for a call, those that the callee uses."""
+    """The arguments on which a value depends; for a call, those that the callee uses."""
     if value.op == "call":
         return [value.args[i] for i in sorted(value.static.used)]
     return list(value.args)
@@ -145,7 +146,7 @@ def stem_of(routine: Routine) -> str:
 
 
 def shape(type_: str) -> str:
-    """The shader's type for a type of a recording; a spectrum has three channels."""
+    """The shader type for a type in a recording; a spectrum has three channels."""
     return "vec3" if type_ == "spectrum" else type_
 
 
@@ -153,4 +154,4 @@ def check_single(number: float, location: str) -> None:
     """Raise GonioError, which names `location`, if a constant of the source cannot be represented in float32."""
     size = abs(number)
     if math.isnan(number) or size > 3.4028234e38 or 0.0 < size < 1.17549435e-38:
-        raise GonioError(f"the constant {number!r} is not a float32", location, "shader code computes in 32 bits")
+        raise GonioError(f"the constant {number!r} is not a float32 number", location, "shaders compute in float32")

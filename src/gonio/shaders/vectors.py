@@ -1,4 +1,4 @@
-"""Pairs of directions with their values in 64 bits, against which an engine can test its shader."""
+"""Pairs of directions with their values in double precision, with which an engine can test its shader."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..owner import exclusive
 from . import program as programs
 from .manifest import Json, numbers_of
 
-LIMIT = 1_000_000  # pairs: some 300 MB of text
+LIMIT = 1_000_000  # number of pairs, about 300 MB of text
 
 
 @exclusive
@@ -22,14 +22,15 @@ def vectors(
 ) -> dict[str, Json]:
     """Random pairs of directions and the values that a shader should return for them, as plain data for JSON.
 
-    model      anything that `go.material` takes
+    model      anything that `go.material` accepts
     count      number of pairs, at most a million
     functions  a choice of "eval", "pdf", "sample"; other names, such as "terms", are ignored
     seed       seed of the directions and random numbers
     Returns {"model", "seed", "fields": values of the struct by path, "wo", "wi", "u": (count, 3), "eval": (count, 3),
     "pdf": (count,), "sample": {"wi", "weight", "pdf", "delta"}}. Directions and random numbers are float32 numbers, so
-    that a shader receives exactly these; the results are computed from them in float64. A tenth of the pairs are within
-    6 degrees of mirror directions, another tenth at grazing angles. Raises InputError for a stochastic material.
+    that a shader receives exactly the same values; the results are computed from them in float64. In a tenth of the
+    pairs, wi is within 6 degrees of the mirror direction; in another tenth, wo is at a grazing angle. Raises InputError
+    for a stochastic material.
     """
     model = material(model)
     asked = programs.check(model, functions, "emit")

@@ -1,8 +1,8 @@
 """Reading and running shaders.
 
-GLSL and HLSL are compiled to SPIR-V by glslang (`compiler`), Slang by its own compiler (`slang`). SPIR-V is parsed into
-a checked module (`module`), WGSL is translated to one (`wgsl`). The instructions of a module run with the vocabulary of
-`gonio.ops` (`machine`), on Dr.Jit values or on symbols of a recording.
+GLSL and HLSL are compiled to SPIR-V by glslang (`compiler`), and Slang by its own compiler (`slang`). SPIR-V is parsed
+into a checked module (`module`); WGSL is translated to a module (`wgsl`). The instructions of a module are executed
+with the operations of `gonio.ops` (`machine`), on Dr.Jit values or on symbols of a recording.
 
     module = parse(compile_text("float sqr(float x) { return x * x; }", "sqr.glsl"))
     Machine(module).call("sqr", [x])

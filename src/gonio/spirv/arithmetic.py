@@ -1,7 +1,7 @@
-"""SPIR-V's arithmetic on scalars, vectors and matrices, in the vocabulary of `gonio.ops`.
+"""SPIR-V's arithmetic on scalars, vectors and matrices, in terms of `gonio.ops`.
 
-FLOATS, INTEGERS and LOGIC hold functions of scalars, which are applied component by component; WHOLE holds functions of
-whole values.
+FLOATS, INTEGERS and LOGIC contain functions of scalars, which are applied to each component; WHOLE contains functions
+of whole values.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .values import Bits, Undefined, Value, both, either, folded, lost, negated,
 
 
 def elementwise(function: Callable[..., Value], *values: Value) -> Value:
-    """A function of scalars on each component; scalars broadcast."""
+    """Apply a function of scalars to each component; scalars are broadcast."""
     sizes = {len(value) for value in values if isinstance(value, tuple)}
     if not sizes:
         return function(*values)
@@ -29,7 +29,7 @@ def elementwise(function: Callable[..., Value], *values: Value) -> Value:
 
 
 def passing(function: Callable[..., Value]) -> Callable[..., Value]:
-    """A function of scalars that returns the first undefined one, if there is one."""
+    """The function of scalars, extended to return the first undefined argument, if there is one."""
 
     def passed(*scalars: Value) -> Value:
         undefined = lost(scalars)
@@ -39,7 +39,7 @@ def passing(function: Callable[..., Value]) -> Callable[..., Value]:
 
 
 def _float(plain: Callable[..., object], on_values: Callable[..., Value]) -> Callable[..., Value]:
-    """A function of floats, folded by NumPy if all are constant."""
+    """A function of floats, folded by NumPy if all arguments are constant."""
 
     def function(*values: Value) -> Value:
         if (undefined := lost(values)) is not None:
@@ -84,7 +84,7 @@ def remainder(x: Value, y: Value) -> Value:
 
 
 def _differ(a: Value, b: Value) -> Value:
-    """a != b, which holds for NaN, but is false for it in Dr.Jit's LLVM backend."""
+    """a != b, which is true for NaN, although it is false in Dr.Jit's LLVM backend."""
     return negated(a == b)
 
 
@@ -104,14 +104,14 @@ FLOATS: dict[str, Callable[..., Value]] = {
 
 
 def is_infinite(x: Value) -> Value:
-    """Whether a float is infinite; NaN is not."""
+    """Whether a float is infinite; False for NaN."""
     if static(x):
         return bool(np.isinf(x))
     return both(negated(ops.isfinite(x)), negated(is_nan(x)))
 
 
 def is_nan(x: Value) -> Value:
-    """Whether a float is NaN: every comparison with NaN is false."""
+    """Whether a float is NaN, determined by comparisons, which are false for NaN."""
     if static(x):
         return bool(np.isnan(x))
     return negated(either(x <= 0.0, x > 0.0))
@@ -121,7 +121,7 @@ def is_nan(x: Value) -> Value:
 
 
 def _as_integer(x: Value) -> Value:
-    """An integer: a plain one, or a float with a whole value."""
+    """An integer: a plain integer, or a float with an integer value."""
     return int(x) if static(x) else x
 
 
@@ -142,7 +142,7 @@ def _quotient(a: int, b: int) -> int:
 
 
 def to_integer(x: Value) -> Value:
-    """A float rounded toward 0, as an integer; the nearest one if out of range."""
+    """A float rounded toward 0, as an integer; clamped to the range of integers."""
     if static(x):
         x = numeric(x)
         return int(min(max(x, -(2.0**31)), 2.0**32 - 1.0)) if x == x else 0
@@ -164,13 +164,13 @@ def _reversed(a: int) -> int:
 
 
 def _field(base: int, offset: int, count: int, signed: bool) -> int:
-    """`count` bits of an integer from bit `offset` on."""
+    """`count` bits of an integer, starting at bit `offset`."""
     bits = (base >> offset) & ((1 << count) - 1)
     return bits - (1 << count) if signed and count and bits >> (count - 1) else bits
 
 
 def _with_field(base: int, insert: int, offset: int, count: int) -> int:
-    """An integer whose `count` bits from bit `offset` on are the low bits of `insert`."""
+    """An integer in which `count` bits, starting at bit `offset`, are replaced by the low bits of `insert`."""
     mask = ((1 << count) - 1) << offset
     return (base & ~mask) | ((insert << offset) & mask)
 
@@ -228,7 +228,7 @@ def _same(a: Value, b: Value) -> Value:
 
 
 def dot(a: tuple[Value, ...], b: tuple[Value, ...]) -> Value:
-    """Scalar product; terms with a constant factor 0, such as a component of an axis of the frame, are omitted."""
+    """Dot product; terms with a constant factor 0, such as a component of an axis of the frame, are omitted."""
     terms = [
         y if _is(x, 1.0) else x if _is(y, 1.0) else multiply(x, y)
         for x, y in zip(a, b, strict=True)
@@ -242,7 +242,7 @@ def _is(x: Value, number: float) -> bool:
 
 
 def transpose(matrix: tuple[Value, ...]) -> Value:
-    """The transpose, with rows in place of columns."""
+    """The transpose of a matrix."""
     return tuple(zip(*matrix, strict=True))
 
 
@@ -252,7 +252,7 @@ def matrix_vector(matrix: tuple[Value, ...], vector: tuple[Value, ...]) -> Value
 
 
 def choose(mask: Value, a: Value, b: Value) -> Value:
-    """OpSelect: by one mask, or component by component."""
+    """OpSelect with one mask, or with one mask per component."""
     if isinstance(mask, tuple):
         return tuple(choose(m, x, y) for m, x, y in zip(mask, a, b, strict=True))
     if isinstance(mask, Undefined):

@@ -1,4 +1,4 @@
-"""The bits of floats that are not constant, as far as logarithms, powers of two and signs need them.
+"""Operations on the bits of floats that are not constant, as needed for logarithms, powers of two and signs.
 
 (floatBitsToInt(x) >> 23) - 127                                             floor(log2 |x|)
 intBitsToFloat((e + 127) << 23)                                             2^e
@@ -13,13 +13,13 @@ import struct
 from .. import ops
 from .values import Bits, Value, numeric, refuse, static, wrapped
 
-MANTISSA = 23  # bits
+MANTISSA = 23  # number of bits
 BIAS = 127
 SIGN, MAGNITUDE = 0x80000000, 0x7FFFFFFF
 
 
 def cast(value: Value, before: str, kind: str) -> Value:
-    """The bits of a scalar of type `before` as type `kind`, each "float", "int" or "uint"."""
+    """The bits of a scalar of type `before`, interpreted as type `kind`; both are "float", "int" or "uint"."""
     if static(value):
         words = struct.pack("<f", value) if isinstance(value, float) else struct.pack("<I", wrapped(int(value), False))
         if kind == "float":
@@ -31,7 +31,7 @@ def cast(value: Value, before: str, kind: str) -> Value:
         if kind != "float" or value.number is not None:
             return value.number if kind == "float" else value
         return _power_of_two(value.exponent - float(BIAS))
-    if before != "float" and kind != "float":  # a number with a whole value, negative ones modulo 2^32
+    if before != "float" and kind != "float":  # an integer value; negative values are taken modulo 2^32
         value = numeric(value)
         return (
             ops.where(value < 0.0, value + 2.0**32, value)
@@ -44,10 +44,10 @@ def cast(value: Value, before: str, kind: str) -> Value:
 
 
 def _power_of_two(e: Value) -> Value:
-    """2^e for an integer e: exact, except for a rounding error in 32 bits from 2^100 on.
+    """2^e for an integer e; exact, except for a rounding error in single precision for e >= 100.
 
-    The error of `exp`, a few ulps, is in the lower half of the digits, which is 0 for a power of two and is removed by
-    Veltkamp's splitting (Dekker1971).
+    The error of `exp`, a few ulps, is in the lower half of the digits, which are 0 for a power of two and are removed
+    by Veltkamp's splitting (Dekker1971).
     """
     about = ops.exp(e * math.log(2.0))
     multiple = about * ((2.0**12 if ops.is_short(e) else 2.0**27) + 1.0)
@@ -55,12 +55,12 @@ def _power_of_two(e: Value) -> Value:
 
 
 def shifted_right(value: Bits, count: Value) -> Value:
-    """The bits of a float shifted right by 23: sign and exponent."""
+    """The bits of a float shifted right by 23, which are the sign and the exponent."""
     if value.number is None or value.part == "sign" or count != MANTISSA:
         raise refuse("bit operations on varying integers are not supported", "compute with floats")
     size = ops.abs(value.number)
     guess = ops.floor(ops.log(size) * (1.0 / math.log(2.0)))
-    # the logarithm of a power of two may round to either side
+    # the logarithm of a power of two may be rounded in either direction
     mantissa = size * ops.exp(-guess * math.log(2.0))
     exponent = ops.where(mantissa < 1.0 - 1e-12, guess - 1.0, ops.where(mantissa > 2.0 - 1e-12, guess + 1.0, guess))
     return exponent + float(BIAS)
@@ -74,7 +74,7 @@ def shifted_left(value: Value, count: Value) -> Value:
 
 
 def masked(a: Value, b: Value) -> Value:
-    """a & b, one of which is the bits of a float: its sign or its magnitude."""
+    """a & b, where one operand is the bits of a float; the result is the sign or the magnitude of the float."""
     bits, mask = (a, b) if isinstance(a, Bits) else (b, a)
     word = 0 if isinstance(mask, Bits) or not static(mask) else wrapped(int(mask), False)
     if bits.number is None or bits.part == "sign" or word not in (SIGN, MAGNITUDE):
@@ -83,7 +83,7 @@ def masked(a: Value, b: Value) -> Value:
 
 
 def joined(a: Value, b: Value) -> Value:
-    """a | b of a magnitude and a sign."""
+    """a | b for a magnitude and a sign."""
     size: Value
     size, sign = (b, a) if isinstance(a, Bits) and a.part == "sign" else (a, b)
     if not isinstance(sign, Bits) or sign.part != "sign":
@@ -97,7 +97,7 @@ def joined(a: Value, b: Value) -> Value:
 
 
 def flipped(a: Value, b: Value) -> Value:
-    """a ^ b of a float's bits and a sign."""
+    """a ^ b for the bits of a float and a sign."""
     bits, sign = (b, a) if isinstance(a, Bits) and a.part == "sign" else (a, b)
     if static(bits):
         bits, sign = sign, bits

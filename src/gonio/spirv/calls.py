@@ -1,8 +1,8 @@
 """Calls of a shader's functions, recorded as calls: emitted text preserves the functions and their names, and a
 function that is called many times is recorded once.
 
-A recorded function takes and returns only values. Pointers among its arguments, and the globals that it names, are
-therefore passed as values, and those that it changes are returned as values.
+The arguments and results of a recorded function are values only. Pointers among its arguments, and the globals to which
+it refers, are therefore passed as values, and those that it changes are returned as values.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Run = Callable[[Function, Sequence[Value], Value], Value]
 
 
 def globals_of(module: Module, function: Function, known: dict[int, frozenset[int]]) -> frozenset[int]:
-    """The ids of the globals that a function and its callees may name; `known` caches them by function."""
+    """The ids of the globals to which a function and its callees may refer; `known` caches them by function."""
     if function.id not in known:
         every = [one for block in blocks_of(module, [function.id]) for one in block.instructions]
         known[function.id] = frozenset(id for one in every for id in one.operands if id in module.variables)
@@ -35,7 +35,7 @@ class Recorded:
     """A function of the shader in the form that the recorder needs: with a name, a signature and values as arguments.
 
     run    executes the function on the machine of this call
-    cells  the globals that it may name, by id
+    cells  the globals to which it may refer, by id
     """
 
     def __init__(self, module: Module, function: Function, run: Run, cells: dict[int, Cell]) -> None:
@@ -59,7 +59,7 @@ class Recorded:
         return hash((id(self.module), self.function.id))
 
     def __call__(self, **given: Value) -> dict[str, Any]:
-        """The result, with the values of changed pointers and globals; the result alone if none were changed."""
+        """The result, together with the values of changed pointers and globals, if there are any."""
         values = [_unpacked(value) for value in given.values()]
         pointers: dict[int, Pointer] = {}
         arguments: list[Value] = []
@@ -83,7 +83,7 @@ class Recorded:
 
 
 def recorded(one: Recorded, arguments: Sequence[Value], mask: Value) -> Value:
-    """The result of a recorded call; pointers and globals are set to their new values under a mask."""
+    """The result of a recorded call; under a mask, pointers and globals are set to their new values."""
     given = [argument.load() if isinstance(argument, Pointer) else argument for argument in arguments]
     held = [cell.value for cell in one.cells.values()]
     results = graph.call(one, tuple(_packed(value) for value in (*given, *held)), {}, constants=True)
@@ -97,14 +97,14 @@ def recorded(one: Recorded, arguments: Sequence[Value], mask: Value) -> Value:
 
 
 class _Plain(tuple[float]):
-    """A plain number as an argument. It stays a plain number, since it may be the bound of a loop."""
+    """A plain number as an argument. It remains a plain number, because it may be the bound of a loop."""
 
 
 _VECTORS = {2: ("vec2", "xy"), 3: ("vec3", "xyz")}
 
 
 def _packed(value: Value) -> Value:
-    """A value in the recorder's form, which has vectors of two and three numbers."""
+    """A value in the form required by the recorder, which supports vectors of two and three numbers."""
     if type(value) is float:
         return _Plain((value,))
     if not isinstance(value, tuple) or len(value) not in _VECTORS:
@@ -123,7 +123,7 @@ def _unpacked(value: Value) -> Value:
 
 
 def _names(module: Module, ids: Sequence[int]) -> list[str]:
-    """Distinct names of arguments."""
+    """Distinct names for the arguments."""
     names: list[str] = []
     for place, id in enumerate(ids):
         name = re.sub(r"\W", "_", module.names.get(id, "")).strip("_")
@@ -134,7 +134,7 @@ def _names(module: Module, ids: Sequence[int]) -> list[str]:
 
 
 def named(value: Value, name: str) -> None:
-    """Give the numbers of a variable its name in the shader, if they are recorded and have no name."""
+    """Assign a variable's name in the shader to its numbers, if they are recorded and have no name."""
     every = list(leaves(value))
     if name in ("", "param"):  # "param" is glslang's own name for arguments
         return

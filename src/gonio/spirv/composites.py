@@ -11,12 +11,12 @@ from .. import ops
 from .module import MAX_LEAVES, Module
 from .values import Undefined, Value, both, leaves, refuse, select, static
 
-MAX_DYNAMIC = 64  # items of an array with an index that is not constant, unless all items are constants
+MAX_DYNAMIC = 64  # maximum length of an array whose index is not constant, unless all items are constants
 MAX_NESTED = 16
 
 
 class Cell:
-    """A variable: its value, and its id in its function; `partial` tells whether parts of it may be undefined."""
+    """A variable: its value, and its id in its function. `partial` is true if parts of it may be undefined."""
 
     __slots__ = ("id", "partial", "value")
 
@@ -33,7 +33,7 @@ class Pointer:
         self.cell, self.path = cell, path
 
     def load(self, where: str = "") -> Value:
-        """The value; undefined parts get the file and line of this read."""
+        """The value; the file and line of this read are attached to undefined parts."""
         value = self.cell.value
         for index in self.path:
             value = at(value, index)
@@ -44,12 +44,12 @@ class Pointer:
         return result
 
     def store(self, value: Value, mask: Value) -> None:
-        _size(value)  # a variable stored into a part of itself would grow without bound
+        _size(value)  # a variable that is stored in a part of itself would grow without bound
         self.cell.value = _stored(self.cell.value, self.path, value, mask)
 
 
 def placed(value: Value, where: str) -> Value:
-    """A value whose undefined scalars state where they are read; the same object if it has none."""
+    """The value, whose undefined scalars state where they are read; the same object if it has none."""
     if isinstance(value, Undefined):
         return value.at(where)
     if not isinstance(value, tuple):
@@ -75,12 +75,12 @@ def _stored(old: Value, path: tuple[Value, ...], value: Value, mask: Value) -> V
 
 
 def _inside(value: tuple[Value, ...], index: Value) -> int:
-    """An index, clamped to the array as robust GPUs do."""
+    """An index, clamped to the array as on GPUs with robust buffer access."""
     return min(max(int(index), 0), len(value) - 1)
 
 
 def at(value: Value, index: Value) -> Value:
-    """A part of a composite; an index that is not constant selects among all parts."""
+    """A part of a composite; if the index is not constant, it selects among all parts."""
     if isinstance(value, Undefined):
         return value
     if isinstance(index, Undefined):

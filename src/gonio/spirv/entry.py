@@ -1,10 +1,10 @@
-"""A shader's `main`, which is run for the globals that it assigns before it calls the BRDF.
+"""A shader's `main`, which is run in order to obtain the globals that it assigns before it calls the BRDF.
 
     float rough;
     void main() { rough = max(roughness, 0.04); color = brdf(l, v, n); }
 
-An instruction that cannot run here, such as a read of a varying, makes only the values that depend on it undefined.
-Where `main` cannot continue, as at a branch on a varying, all globals that it might still assign become undefined.
+If an instruction cannot run here, such as a read of a varying, only the values that depend on it become undefined. If
+`main` cannot continue, as at a branch on a varying, all globals that it might still assign become undefined.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .values import Undefined, Value, either
 
 
 class _Reached(Exception):
-    """The BRDF is about to be called."""
+    """Raised when the BRDF is about to be called."""
 
 
 class Entry(Machine):
@@ -41,7 +41,7 @@ class Entry(Machine):
     ) -> None:
         super().__init__(module, globals, textures, zero)
         self.until = until
-        self._left: list[int] = []  # the blocks of the entry point that have not run to their ends
+        self._left: list[int] = []  # the blocks of the entry point that have not been completed
 
     def start(self, function: Function) -> None:
         """Run an entry point; its arguments, as in HLSL, are undefined or 0."""
@@ -95,7 +95,7 @@ class Entry(Machine):
             return self.module.undefined(one.type, why)
 
     def _recorded(self, function: Function, arguments: Sequence[Value], mask: Value) -> Value:
-        """Run directly, never recorded as a call: an instruction that cannot run may end it anywhere."""
+        """Run the call directly instead of recording it, because an instruction that cannot run may end it anywhere."""
         return self._run(function, arguments, mask)
 
     def _lose_arguments(self, frame: Frame, ids: Sequence[int], why: Undefined) -> None:
@@ -121,7 +121,8 @@ def prepared(
     starts: Sequence[Function],
     until: Iterable[int],
 ) -> Machine:
-    """A machine whose globals have the values that entry points assign; for the arguments see `Machine` and `Entry`."""
+    """A machine whose globals have the values that entry points assign; for the arguments, see `Machine` and
+    `Entry`."""
     entry, machine = Entry(module, globals, textures, zero, frozenset(until)), Machine(module, globals, textures, zero)
     for start in starts:
         entry.start(start)

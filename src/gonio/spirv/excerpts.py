@@ -1,7 +1,7 @@
 """Single functions from a shader file that does not compile by itself.
 
-`#include <scene_forward_lights_inc.glsl#light_compute>` includes only the function of that name, with its overloads:
-engines have their BRDFs in files that also read the renderer's buffers.
+`#include <scene_forward_lights_inc.glsl#light_compute>` includes only the function with that name and its overloads,
+because the BRDFs of engines are in files that also read the renderer's buffers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _HEAD = r"^[ \t]*(?:(?:highp|mediump|lowp|precise|static|inline)[ \t]+)*\w+[ \t]
 
 
 def functions_in(text: str, names: str, where: str) -> tuple[str, int]:
-    """The definitions of functions, and the line of the first.
+    """The definitions of functions, and the line of the first one.
 
     text   text of a GLSL or HLSL file
     names  names of the functions, separated by commas
@@ -42,7 +42,8 @@ def _definitions(text: str, name: str, where: str) -> list[tuple[int, int]]:
 
 
 def _end(text: str, start: int) -> int:
-    """The position after the body of a function whose arguments begin at `start`; 0 if the body is missing or open."""
+    """The position after the body of a function whose arguments begin at `start`; 0 if the body is missing or not
+    closed."""
     braces = 0
     for token in _TOKEN.finditer(text, start):
         one = token[0]

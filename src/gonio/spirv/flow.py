@@ -1,4 +1,4 @@
-"""The order in which a function's blocks run, its loops, and where its variables are read."""
+"""The order in which a function's blocks run, its loops, and the blocks in which its variables are read."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ ENDS = frozenset({"Branch", "BranchConditional", "Switch", "Return", "ReturnValu
 
 @dataclass
 class Flow:
-    """Facts about a function's blocks.
+    """The control flow of a function's blocks.
 
-    order     label -> its position; a loop's blocks are contiguous, before the block that follows the loop
+    order     label -> position; a loop's blocks are contiguous and precede the block that follows the loop
     loops     label -> the loops that contain it, as sets of labels, innermost first
     reads     variable -> the labels of blocks that read it or pass it to a function
     lasting   ids that are defined inside a loop and used outside
@@ -26,7 +26,7 @@ class Flow:
 
 
 def flow_of(function: Function) -> Flow:
-    """The flow of a function. Raises KeyError for branches to blocks that do not exist."""
+    """The control flow of a function. Raises KeyError for branches to blocks that do not exist."""
     order = _structured(function)
     labels = sorted(order, key=order.__getitem__)
     loops: dict[int, list[frozenset[int]]] = {label: [] for label in labels}
@@ -37,14 +37,14 @@ def flow_of(function: Function) -> Flow:
         end = order.get(merge.operands[0], len(labels))
         inside = frozenset(labels[order[header] : end])
         for label in inside:
-            loops[label].insert(0, inside)  # headers come in order, so that the innermost loop is inserted last
+            loops[label].insert(0, inside)  # headers are in order, so the innermost loop is inserted last
     flow = Flow(order, loops)
     _find_uses(function, flow)
     return flow
 
 
 def _structured(function: Function) -> dict[int, int]:
-    """Reverse postorder, with the merge block of a construct after its blocks."""
+    """The blocks in reverse postorder, in which the merge block of a construct follows the blocks of the construct."""
     entry = next(iter(function.blocks))
     postorder: list[int] = []
     visited = {entry}
@@ -62,7 +62,7 @@ def _structured(function: Function) -> dict[int, int]:
 
 
 def successors(function: Function, label: int) -> list[int]:
-    """The blocks that follow one, the merge block of its construct first."""
+    """The successors of a block, the merge block of its construct first."""
     result: list[int] = []
     for one in function.blocks[label].instructions:
         if one.name == "LoopMerge":

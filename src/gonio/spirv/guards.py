@@ -1,4 +1,4 @@
-"""Include guards and conditions of a C-like text, so that a header is expanded once, not per #include."""
+"""Include guards and conditions of a C-like text, with which a header is expanded only once."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ Context = tuple[str, ...]  # the conditions under which a line is read, outermos
 
 
 def is_guarded(text: str) -> bool:
-    """Whether a second copy of the text would have no effect: it is guarded by a macro, or by #pragma once."""
+    """Whether a second copy of the text would have no effect because of an include guard or #pragma once."""
     return bool(_GUARD.match(text) or _ONCE.match(text))
 
 
 def guarded(text: str, content: str, name: str) -> str:
-    """The expansion of a text, guarded by a macro if it has #pragma once, which the compiler ignores."""
+    """The expansion of a text; #pragma once, which the compiler ignores, is replaced by a guard macro."""
     return f"#ifndef {name}\n#define {name}\n{content}\n#endif" if _ONCE.match(text) else content
 
 
 def context(text: str, at: int) -> Context:
-    """The conditions around a position in a text, without that of its include guard."""
+    """The conditions around a position in a text, except for the condition of its include guard."""
     guard = _GUARD.match(text)
     stack: list[str] = []
     for word, rest in _LINE.findall(text, guard.end() if guard else 0, at):

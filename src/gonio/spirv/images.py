@@ -1,4 +1,4 @@
-"""Textures as tables, read by `ops.lookup` and `ops.fetch` with the filter and edge rule of a sampler."""
+"""Textures as tables, read by `ops.lookup` and `ops.fetch` with the filter and the wrap mode of a sampler."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FILTERS = ("linear", "nearest")
 
 @dataclass(frozen=True)
 class Texture:
-    """A texture: its table, (rows, columns, channels), with row 0 at v = 0; None if no file was named.
+    """A texture: its table, (rows, columns, channels), with row 0 at v = 0; None if no file was given.
 
     wrap        "clamp" to the edge, or "repeat"
     filter      "linear" between texel centers, or "nearest"
@@ -34,12 +34,12 @@ class Texture:
     declared: str = ""
 
     def texels(self) -> ops.Table:
-        """The table. Raises InputError if there is none, or if its declared kind is unsupported or different."""
+        """The table. Raises InputError if there is none, or if the declared kind is not supported or is different."""
         if self.declared:
             raise refuse(f"'{self.name}' is {self.declared}", "tables are textures of one, two or three dimensions")
         if self.table is not None and self.dimensions not in (0, len(self.table.shape)):
-            what = f"the texture '{self.name}' has {self.dimensions} dimensions, its table {len(self.table.shape)}"
-            raise refuse(what, "an .npy with one axis per dimension, and one of channels")
+            what = f"the texture '{self.name}' has {self.dimensions} dimensions, its table has {len(self.table.shape)}"
+            raise refuse(what, "give an .npy file with one axis per dimension and one for the channels")
         if self.table is None:
             raise refuse(f"the texture '{self.name}' has no file", f"[textures] {self.name} = 'FILE' in the adapter")
         return self.table
@@ -77,14 +77,14 @@ def sampled(name: str, values: list[Value]) -> Value:
 
 
 def _fetched(table: ops.Table, places: list[Value]) -> tuple[Value, ...]:
-    """The channels of a texel; plain numbers if its coordinates are."""
+    """The channels of a texel; plain numbers if its coordinates are plain numbers."""
     if all(map(static, places)):
         return tuple(float(channel) for channel in fetch_in_numpy(table, *places))
     return ops.fetch(table, *places)
 
 
 def _varying(places: list[Value]) -> list[Value]:
-    """The coordinates, all as values of the formula if one is."""
+    """The coordinates; if one of them is not a plain number, none is."""
     known = next((x for x in places if not static(x)), None)
     if known is None:
         return [where(True, x, x) if not static(x) else x for x in places]
@@ -96,7 +96,7 @@ def _wrapped(x: Value, wrap: str) -> Value:
 
 
 def _four(channels: tuple[Value, ...]) -> Value:
-    """Red, green, blue and alpha, with missing channels filled as by a sampler."""
+    """Red, green, blue and alpha; missing channels have the values that a sampler returns."""
     parts = [float(c) if isinstance(c, np.ndarray) and c.ndim == 0 else c for c in channels]
     return (*parts[:4], *(0.0, 0.0, 0.0, 1.0)[len(parts) :])
 
@@ -105,7 +105,7 @@ _padded_tables: dict[int, tuple[ops.Table, ops.Table]] = {}
 
 
 def _padded(table: ops.Table) -> ops.Table:
-    """The table with its opposite edges repeated around it, for the edge rule "repeat"."""
+    """The table, surrounded by copies of its opposite edges, for the wrap mode "repeat"."""
     if id(table) not in _padded_tables:
         axes = [(1, 1)] * len(table.shape) + [(0, 0)]
         _padded_tables[id(table)] = table, ops.Table(f"{table.name}_repeated", np.pad(table.values, axes, "wrap"))

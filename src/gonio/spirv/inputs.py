@@ -1,5 +1,5 @@
-"""The values of a module's global variables before its functions run: given values, the text's initial values, and
-otherwise undefined scalars, which are refused if a result depends on them.
+"""The values of a module's global variables before its functions run: given values, initial values in the text, and
+otherwise undefined scalars, which are rejected if a result depends on them.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ _ZERO = "or add `unset_is_zero = true` to the adapter"
 def initial(
     module: Module, one: Instruction, given: Mapping[str, Value], textures: Mapping[str, Texture], zero: bool
 ) -> Value:
-    """The value of a global, from its declaration.
+    """The value of a global, as given or from its declaration.
 
     given     values of uniforms, and of members of a uniform block, by name
     textures  textures by the names of samplers
-    zero      whether everything else is 0
+    zero      whether all other values are 0
     """
     inside = module.type(one.type).parts[0]
     name, kind = module.names.get(one.result, ""), module.type(inside)
@@ -61,6 +61,6 @@ def _unset(module: Module, type: int, space: int, name: str, zero: bool) -> Valu
         what = f"the uniform '{name}' of {module.type(type).size} numbers ({module.shape(type)}) is not a parameter"
         return module.undefined(type, Undefined(what, f"use at most 64 numbers; {_ZERO}", True))
     hint = f"give it an initial value{', or assign it in `main` from uniforms' if module.entered else ''}; {_ZERO}"
-    # where lanes are merged, lanes that wrote no value may take any, unless an entry point may have written one
+    # where lanes are merged, lanes that wrote no value may have any value, unless an entry point may have written one
     firm = not module.entered
     return module.undefined(type, Undefined(f"the global '{name}' is read and was never assigned", hint, firm))

@@ -1,8 +1,9 @@
-"""A module's functions, run with the vocabulary of `gonio.ops`.
+"""Execution of a module's functions with the operations of `gonio.ops`.
 
 All lanes run together: each block runs under the mask of the lanes that reach it, which selects stores and results. A
-loop runs until no lane is left in it; its counter is a plain number, so the loop unrolls. Loops whose end depends only
-on values that are not constant are refused, as are discard, atomics, barriers and all else without meaning for a BSDF.
+loop runs until no lane is left in it; its counter is a plain number, so the loop is unrolled. Loops whose end depends
+only on values that are not constant are rejected, and so are discard, atomics, barriers and all other constructs that
+have no meaning for a BSDF.
 """
 
 from __future__ import annotations
@@ -39,13 +40,13 @@ from .values import (
 )
 from .work import Work
 
-MAX_ITERATIONS = 4096  # of a loop with a constant counter, each time it is entered
-MAX_VARYING = 256  # of a loop without a constant bound, which is then refused
-MAX_DEPTH = 64  # of calls
+MAX_ITERATIONS = 4096  # iterations of a loop with a constant counter, each time it is entered
+MAX_VARYING = 256  # iterations of a loop without a constant bound, after which it is rejected
+MAX_DEPTH = 64  # depth of nested calls
 
 
 class Frame:
-    """One call of a function: its values by id, and the waiting blocks, label -> (mask, values of its phis)."""
+    """One call of a function: its values by id, and the pending blocks, label -> (mask, values of the block's phis)."""
 
     def __init__(self, function: Function, flow: Flow, outer: Value) -> None:
         self.function, self.flow, self.outer = function, flow, outer
@@ -58,11 +59,11 @@ class Frame:
 
 
 class Machine:
-    """A module ready to run.
+    """A module that is ready to run.
 
     globals  name of a global -> its value; members of an unnamed block are globals themselves
     textures name of a sampler -> its texture
-    zero     whether variables that are never set are 0; otherwise they are refused if a result depends on them
+    zero     whether variables that are never set are 0; otherwise, they are rejected if a result depends on them
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class Machine:
     def call(self, function: Function, arguments: Sequence[Value]) -> Value:
         """The result of a function. Values given for pointer arguments are stored in new variables.
 
-        Raises InputError, with the line of the file, for unsupported constructs and damaged modules.
+        Raises InputError, with file and line, for unsupported constructs and damaged modules.
         """
         self._work, self._stack = Work(self.module), []
         kinds = [self.module.type(kind).kind for _, kind in function.parameters]
@@ -145,7 +146,7 @@ class Machine:
             label = min(frame.waiting, key=frame.flow.order.__getitem__)
             mask, phis = frame.waiting.pop(label)
             if not frame.waiting:
-                mask = negated(frame.returned)  # all lanes reach this block: a shorter expression of the same mask
+                mask = negated(frame.returned)  # all remaining lanes reach this block; this expression is shorter
             for id, value in phis.items():
                 self._keep(frame, id, value, mask)
             self._block(frame, frame.function.blocks[label], mask)
@@ -191,14 +192,14 @@ class Machine:
             raise InputError(what, place, "compile it again") from error
 
     def _keep(self, frame: Frame, id: int, value: Value, mask: Value) -> None:
-        """Set the value of an id; lanes that have left its loop keep the old one if it is used after the loop."""
+        """Set the value of an id; if it is used after its loop, lanes that have left the loop retain the old value."""
         if id in frame.flow.lasting and id in frame.values and not isinstance(value, Pointer):
             value = select(mask, value, frame.values[id])
         self._work.copied(value)
         frame.values[id] = value
 
     def _leave(self, frame: Frame, block: Block, one: Instruction, mask: Value) -> bool:
-        """Whether an instruction ends the block; its successors are then waiting."""
+        """Whether an instruction ends the block; if so, its successors become pending."""
         operands = one.operands
         if one.name == "LoopMerge":
             self._check_rounds(frame, block.label, mask)
@@ -218,7 +219,7 @@ class Machine:
                 rest = both(rest, negated(equal))
             self._edge(frame, block.label, operands[1], rest)
         elif one.name == "ReturnValue":
-            # lanes that returned before keep their results
+            # lanes that returned earlier retain their results
             frame.result = select(frame.returned, frame.result, self._get(frame, operands[0]))
             frame.returned = either(frame.returned, mask)
         elif one.name in ("Return", "Unreachable"):
@@ -258,7 +259,7 @@ class Machine:
         return self._recorded(function, arguments, both(frame.outer, mask))
 
     def _recorded(self, function: Function, arguments: Sequence[Value], mask: Value) -> Value:
-        """The result of a call; a recording, if there is one, contains it as a call."""
+        """The result of a call; if a recording is active, it contains the call."""
         if not calls.is_recordable(arguments):
             return self._run(function, arguments, mask)
         named = calls.globals_of(self.module, function, self._named)
@@ -290,7 +291,7 @@ class Machine:
         self._work.copied(target.cell.value)
 
     def _buffer(self, target: Pointer) -> str:
-        """The name of a buffer, or of its member if it has none itself, as in GLSL."""
+        """The name of a buffer; if it has none, as in GLSL, the name of its member."""
         one = self._read_only[id(target.cell)]
         inside = self.module.type(one.type).parts[0]
         member = self.module.members.get((inside, target.path[0])) if target.path and static(target.path[0]) else None
@@ -299,8 +300,8 @@ class Machine:
     def _unread_elsewhere(self, frame: Frame, label: int, cell: Cell) -> bool:
         """Whether lanes outside this block never read a variable's current value, so that a store needs no mask.
 
-        This holds if all lanes of a loop are in the block and only the loop reads the variable. It keeps loop counters
-        plain numbers.
+        This is the case if all lanes of a loop are in the block and only the loop reads the variable. Loop counters
+        thus remain plain numbers.
         """
         reads = frame.flow.reads.get(cell.id, set())
         for loop in (*frame.flow.loops[label], frozenset(frame.flow.order)):
@@ -316,7 +317,7 @@ class Machine:
             known = self._get(frame, one.operands[1]) if len(one.operands) > 1 else self._unset(one)
             cell = Cell(known, one.result)
             frame.own.add(id(cell))
-            frame.values[-one.result] = cell  # keeps it alive, so that its id is not reused
+            frame.values[-one.result] = cell  # keeps the cell alive, so that its id is not reused
             return Pointer(cell)
         if name == "ExtInst":
             return self._standard(frame, one)
@@ -324,7 +325,7 @@ class Machine:
             count = composites.LITERAL[name]
             values = [self._get(frame, id) for id in one.operands[:count]]
             return composites.literal(name, values, one.operands[count:])
-        arguments = one.operands[:2] if name in ("ImageSample", "ImageFetch") else one.operands  # no literals
+        arguments = one.operands[:2] if name in ("ImageSample", "ImageFetch") else one.operands  # ids only
         values = [self._get(frame, id) for id in arguments]
         if name == "Load":
             if not isinstance(values[0], Pointer):
@@ -335,7 +336,7 @@ class Machine:
         if name in composites.COMPOSED:
             return composites.COMPOSED[name](self.module, one.type, *values)
         if name == "Bitcast":
-            source = frame.function.types.get(one.operands[0], one.type)  # constants are not in `types`
+            source = frame.function.types.get(one.operands[0], one.type)  # `types` does not contain constants
             before, after = self._scalar(source), self._scalar(one.type)
             return elementwise(passing(lambda part: cast(part, before, after)), *values)
         return self._arithmetic(one, values)
@@ -376,7 +377,7 @@ class Machine:
     def _check_width(self, id: int) -> None:
         kind = self._scalar(id)
         if "-bit" in kind:
-            hint = "declare 32-bit numbers; gonio evaluates them in 64 bits if asked"
+            hint = "declare 32-bit numbers; Gonio can evaluate them in double precision"
             raise refuse(f"{kind}s are not supported", hint)
 
     def _standard(self, frame: Frame, one: Instruction) -> Value:

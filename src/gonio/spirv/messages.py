@@ -1,4 +1,4 @@
-"""Messages of shader compilers in terms of BSDFs: exceeded limits, and features that a BSDF cannot have."""
+"""Explanations of compiler messages in terms of BSDFs: exceeded limits, and features that a BSDF cannot have."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ ALONE = "a BSDF is a function of directions and parameters alone"
 
 
 def explained(message: str, printed: str) -> tuple[str, str]:
-    """An error and a hint in place of a compiler's message that says less than is known.
+    """An error and a hint for a compiler message, more specific than the message if its cause is known.
 
-    printed  everything that the compiler wrote
+    printed  the complete output of the compiler
     """
     if "Recursion detected" in message and (pair := _RECURSION.search(printed)):
         a, b = pair.groups()
@@ -31,16 +31,16 @@ def explained(message: str, printed: str) -> tuple[str, str]:
         for pattern, kind in _KINDS.items():
             if re.fullmatch(pattern, name):
                 return f"{kind} ({name}) is not supported", ALONE
-    if "memory exhausted" in message:  # of its parser's stack, which has 10,000 entries
-        return "brackets or blocks that nest too deep for the compiler", "nest them less"
+    if "memory exhausted" in message:  # of the parser's stack, which has 10,000 entries
+        return "brackets or blocks are nested too deeply for the compiler", "reduce the nesting"
     return message, "correct the line"
 
 
 def ended(code: int, printed: str, seconds: int, memory: int, size: int) -> tuple[str, str]:
     """An error and a hint for a compiler that ended without a message.
 
-    code     its exit code, or minus the number of the signal that ended it
-    seconds, memory, size  its limits: seconds of CPU time, bytes of memory, bytes of a module
+    code     exit code, or minus the number of the signal that ended the compiler
+    seconds, memory, size  limits of the compiler: CPU time in seconds, memory in bytes, size of a module in bytes
     """
     shorter = "shorten the shader: its macros, loops, types and functions"
     if "bad_alloc" in printed or "MemoryError" in printed or "out of memory" in printed.lower():

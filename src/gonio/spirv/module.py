@@ -1,6 +1,6 @@
 """SPIR-V modules: words parsed into types, constants, variables and functions, with every index checked.
 
-A module is untrusted. Sizes are bounded, and a type refers only to earlier ones, so that none is infinite.
+Modules are untrusted. Sizes are bounded, and a type may refer only to earlier types, so that no type is infinite.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from ..errors import InputError
 from .opcodes import NAMES, REFUSED, TYPES
 from .values import UNDEFINED, Undefined, Value, refuse, wrapped
 
-SOURCE = "gonio-shader.frag"  # the file that the compiler reads; messages name the user's file instead
+SOURCE = "gonio-shader.frag"  # the file that the compiler reads; in messages, it is replaced by the user's file
 MAGIC = 0x07230203
-UNIFORM = 0  # the storage class of a uniform outside blocks, UniformConstant
+UNIFORM = 0  # storage class of a uniform outside blocks, UniformConstant
 BUFFERS = (2, 9, 12)  # storage classes of blocks: uniform, push constants, storage
 UNIFORMS = (UNIFORM, *BUFFERS)
 _DEBUG = "NonSemantic.Shader.DebugInfo.100"
 MAX_BYTES = 1 << 26
-MAX_BOUND = 1 << 22  # ids; SPIR-V's own limit
-MAX_LEAVES = 1 << 16  # scalars in one value
+MAX_BOUND = 1 << 22  # number of ids, which is SPIR-V's own limit
+MAX_LEAVES = 1 << 16  # number of scalars in one value
 
 
 class Type(NamedTuple):
     """A type: kind is "float", "int", "uint", "bool", "vector", "matrix", "array", "struct", "pointer", "image", ...
 
-    parts   the types inside; one for vectors, matrices and arrays
+    parts   the contained types; one for vectors, matrices and arrays
     length  number of components, columns or items; for a struct, number of leaves
     size    number of scalars in a value
     """
@@ -53,7 +53,7 @@ class Instruction(NamedTuple):
 
 @dataclass
 class Block:
-    """Instructions up to the one that ends the block."""
+    """A block: instructions, the last of which ends the block."""
 
     label: int
     instructions: list[Instruction] = field(default_factory=list)
@@ -61,7 +61,7 @@ class Block:
 
 @dataclass
 class Function:
-    """A function: its result type, its parameters as (id, type), its blocks in the order of the module."""
+    """A function: its result type, its parameters as (id, type), and its blocks in the order of the module."""
 
     id: int
     type: int
@@ -70,22 +70,22 @@ class Function:
 
     @cached_property
     def types(self) -> dict[int, int]:
-        """The types of its values, by id; only once the function has been read."""
+        """The types of the function's values, by id; available once the function has been read."""
         every = [one for block in self.blocks.values() for one in block.instructions]
         return {**dict(self.parameters), **{one.result: one.type for one in every}}
 
 
 @dataclass
 class Module:
-    """A module, by ids.
+    """A module, with its contents by id.
 
-    names      id -> name; members: (struct type, index) -> name
+    names      id -> name; for members, (struct type, index) -> name
     variables  id -> instruction, for variables outside functions
     constants  id -> value
-    sets       id of an instruction set -> its name
+    sets       id of an instruction set -> name
     refused    id of a function that a front end could not translate -> the error
-    defaults   name of a uniform -> its value in the text, if any
-    costs      id of a function -> instructions of a call, including callees; known after the first call
+    defaults   name of a uniform -> its initial value in the text, if any
+    costs      id of a function -> number of instructions of a call, including callees; known after the first call
     images     id of an image type that is not supported -> its description
     entered    whether entry points are among the functions
     """
@@ -105,17 +105,17 @@ class Module:
     entered: bool = True
 
     def type(self, id: int) -> Type:
-        """The type of an id. Raises InputError if there is none."""
+        """The type with an id. Raises InputError if there is none."""
         if id not in self.types:
             raise refuse(f"SPIR-V id {id} is not a type")
         return self.types[id]
 
     def function(self, name: str) -> list[Function]:
-        """The functions of a name: all its overloads."""
+        """The functions with a name, that is, all its overloads."""
         return [one for id, one in self.functions.items() if self.names.get(id, "").partition("(")[0] == name]
 
     def zero(self, id: int) -> Value:
-        """The value of a type with all scalars 0."""
+        """The value of a type in which all scalars are 0."""
         kind = self.type(id)
         if kind.kind in ("float", "int", "uint", "bool"):
             return {"float": 0.0, "int": 0, "uint": 0, "bool": False}[kind.kind]
@@ -126,7 +126,7 @@ class Module:
         return UNDEFINED
 
     def undefined(self, id: int, why: Undefined = UNDEFINED) -> Value:
-        """The value of a type with all scalars undefined."""
+        """The value of a type in which all scalars are undefined."""
         kind = self.type(id)
         if kind.kind == "struct":
             return tuple(self.undefined(part, why) for part in kind.parts)
@@ -193,13 +193,13 @@ class _Parser:
         elif opcode in NAMES:
             self._instruction(NAMES[opcode], words)
         elif opcode in REFUSED and self.block is not None:
-            # refused only where it runs: a function of the file that no formula calls may contain anything
+            # rejected only if it is executed: a function that is not called may contain any instruction
             self._append(Instruction("refused", 0, 0, (opcode,), self.line, self.file))
         elif self.block is not None and opcode != 0:
             self._append(Instruction("refused", 0, 0, (opcode,), self.line, self.file))
 
     def _debug(self, result: int, number: int, operands: tuple[int, ...]) -> None:
-        """Source lines as stated by Slang's compiler, which does not use OpLine."""
+        """Process source lines from Slang's compiler, which does not use OpLine."""
         if number == 35:  # DebugSource
             file = self.module.strings.get(operands[0], "")
             self.module.strings[result] = self.where if file in ("", "0") else file  # "0" is the text itself
@@ -308,7 +308,7 @@ class _Parser:
 
 
 def _instructions(data: bytes, where: str) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """Opcode and operands of each instruction, after a check of the header."""
+    """The opcode and operands of each instruction, after a check of the header."""
     if len(data) < 20 or len(data) % 4 or len(data) > MAX_BYTES:
         raise InputError(f"{len(data)} bytes, not a SPIR-V module", where, "give the .spv that a compiler wrote")
     order = "<" if struct.unpack("<I", data[:4])[0] == MAGIC else ">"

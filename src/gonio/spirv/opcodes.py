@@ -1,4 +1,4 @@
-"""SPIR-V opcodes: the supported instructions, and descriptions of refused ones."""
+"""SPIR-V opcodes: the supported instructions, and descriptions of rejected ones."""
 
 from __future__ import annotations
 

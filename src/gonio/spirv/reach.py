@@ -1,4 +1,4 @@
-"""What functions of a module may use: the functions that they call, and the globals that they read and write."""
+"""The functions that the functions of a module call, and the globals that they read and write."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Iterable, Iterator
 from .flow import successors
 from .module import Block, Function, Module
 
-Part = tuple[int, int | None]  # a global, and a member of it; None for all of it
+Part = tuple[int, int | None]  # a global and a member of the global; None for the whole global
 
 
 def blocks_of(module: Module, starts: Iterable[int], without: Iterable[int] = ()) -> Iterator[Block]:
-    """The blocks of functions, by ids, and of all that they call.
+    """The blocks of functions with the given ids, and of all functions that these call.
 
-    without  functions to omit, with those that only they call
+    without  functions to omit, together with the functions that only they call
     """
     visited, waiting = set(without), list(starts)
     while waiting:
@@ -32,7 +32,7 @@ def called(blocks: Iterable[Block]) -> set[int]:
 
 
 def following(function: Function, labels: Iterable[int]) -> list[Block]:
-    """The blocks of these labels, and those that may run after them."""
+    """The blocks with these labels, and those that may run after them."""
     visited, waiting = set[int](), list(labels)
     while waiting:
         one = waiting.pop()
@@ -43,7 +43,7 @@ def following(function: Function, labels: Iterable[int]) -> list[Block]:
 
 
 def read(module: Module, blocks: Iterable[Block]) -> set[Part]:
-    """The globals, or members of them, that blocks read. A global that is passed to a function counts as a whole."""
+    """The globals, or members of globals, that blocks read. A global that is passed to a function counts as a whole."""
     return _used(module, blocks, writes=False)
 
 

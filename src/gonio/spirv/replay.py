@@ -1,7 +1,7 @@
-"""Replay of a shader's function on Dr.Jit values: it is recorded once, and each call repeats the machine's operations
-in the same order, without decoding instructions, masks and pointers again.
+"""Replay of a shader's function on Dr.Jit values: the function is recorded once, and each call repeats the machine's
+operations in the same order, without decoding instructions, masks and pointers again.
 
-This only saves time: without it `Program.run` gives the same values.
+Replay only saves time: without it, `Program.run` returns the same values.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ _OPERATIONS: dict[str, Callable[..., Value]] = {
     "abs": ops.abs, "minimum": ops.minimum, "maximum": ops.maximum, "exp": ops.exp, "log": ops.log, "sin": ops.sin,
     "cos": ops.cos, "atan2": ops.atan2, "floor": ops.floor, "copysign": ops.copysign, "isfinite": ops.isfinite,
 }  # fmt: skip
-MAX_RECORDED = 16  # of one function, by the plain numbers among its arguments
+MAX_RECORDED = 16  # recordings of one function for different plain numbers among its arguments
 
 Inputs = Mapping[str, Mapping[str, Value]]
 
 
 class Replayed:
-    """A function of named scalars and tuples of scalars, recorded for each combination of those that are plain numbers.
+    """A function of named scalars and tuples of scalars, with one recording for each combination of plain numbers.
 
-    It is recorded separately for 32 and 64 bits, which compute a power of two from its exponent differently.
+    There are separate recordings for single and double precision, which compute a power of two from its exponent
+    differently.
 
     function  a function of mappings from names to values, such as `Program.run`
     """
@@ -40,7 +41,8 @@ class Replayed:
         self._recorded: dict[tuple[object, ...], graph.Function] = {}
 
     def __call__(self, **inputs: Mapping[str, Value]) -> Value:
-        """The function's value. Symbols of a recording are passed on, so that it contains the shader's functions."""
+        """The function's value. Symbols of a recording are passed on, so that the recording has the shader's
+        functions."""
         scalars = list(_scalars(inputs))
         if any(isinstance(scalar, graph.Node) for _, scalar in scalars):
             return self.function(**inputs)
@@ -73,13 +75,13 @@ def _scalars(inputs: Inputs) -> Iterator[tuple[str, Value]]:
 
 
 def _filled(value: Value, path: str, symbols: Mapping[str, Value]) -> Value:
-    """A value with symbols in place of the scalars that are not plain numbers."""
+    """A value in which symbols replace the scalars that are not plain numbers."""
     filled = tuple(symbols.get(f"{path}.{place}", scalar) for place, scalar in enumerate(leaves(value)))
     return filled if isinstance(value, tuple) else filled[0]
 
 
 def _run(function: graph.Function, arguments: list[Value]) -> Value:
-    """The result of a recording, in its structure."""
+    """The result of a recording, in its original structure."""
     results = iter(_results(function, arguments))
     return rebuild(function.result, lambda _: next(results), graph.Node)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import InputError, MachineError
 
 INSTALL = "pip install gonio[slang], or slangpy alone"
-# directives that make the compiler read files; #include is resolved earlier
+# directives with which the compiler itself reads files; #include is resolved earlier
 _READS = re.compile(r"#\s*include\b|\b(?:__)?(?:import|include|implementing)\b")
 _SKIPPED = re.compile(r'("(?:\\.|[^"\\\n])*")|//[^\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
 _LINE = re.compile(r"^([ \t]*#line \d+) (\d+)$", re.MULTILINE)
@@ -34,11 +34,11 @@ def command(source: Path, output: Path) -> list[str]:
 
 
 def program(text: str, calls: list[tuple[str, str, str]], name: str) -> str:
-    """A text with an entry point that uses every function and stores the results in groupshared memory, since the
-    compiler drops functions without an effect.
+    """A text with an entry point that uses every function and stores the results in groupshared memory, because the
+    compiler removes functions that have no effect.
 
     calls  (type of the result, declarations of arguments, call)
-    Raises InputError for modules, which the compiler would read from any file.
+    Raises InputError for modules, which the compiler could read from any file.
     """
     code = _SKIPPED.sub(lambda match: '""' if match[1] else " ", re.sub(r"\\\r?\n", "", text))
     if (reads := _READS.search(code)) is not None:
@@ -47,7 +47,7 @@ def program(text: str, calls: list[tuple[str, str, str]], name: str) -> str:
     shared, body = [], []
     for place, (kind, arguments, call) in enumerate(calls):
         if kind == "void":
-            outputs = re.findall(r"(\w+) (a\d+) =", arguments)  # no arrays
+            outputs = re.findall(r"(\w+) (a\d+) =", arguments)  # arrays are not matched
             shared += [f"groupshared {one} gonio_{place}_{argument};" for one, argument in outputs]
             stores = " ".join(f"gonio_{place}_{argument} = {argument};" for _, argument in outputs)
             body.append(f"{{ {arguments} {call}; {stores} }}")
@@ -59,7 +59,7 @@ def program(text: str, calls: list[tuple[str, str, str]], name: str) -> str:
 
 
 def messages(printed: str) -> list[tuple[str, str, str]]:
-    """(number of the file, line, message) of each error."""
+    """(number of the file, line, message) for each error."""
     errors = []
     for match in _MESSAGE.finditer(printed):
         detail = _DETAIL.search(printed, match.end())

@@ -1,8 +1,8 @@
-"""Slang to SPIR-V by the compiler's C interface: the child process of `slang`.
+"""Compilation of Slang to SPIR-V through the compiler's C interface: the child process of `slang`.
 
     python slang_child.py LIBRARY SOURCE OUTPUT
 
-Writes the module, or prints the compiler's messages and ends with code 1. It imports nothing of Gonio.
+Writes the module, or prints the compiler's messages and ends with exit code 1. It imports no module of Gonio.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import ctypes
 import sys
 from pathlib import Path
 
-SPIRV, SLANG, COMPUTE, STANDARD = 6, 1, 6, 2  # of slang.h: target, language of the source, stage, debug information
+SPIRV, SLANG, COMPUTE, STANDARD = 6, 1, 6, 2  # constants of slang.h: target, source language, stage, debug information
 
 
 def compile_file(library: str, source: str, output: str) -> int:
-    """0, or 1 after printing the messages. Optimization is off, as it would inline all functions."""
+    """Returns 0, or 1 after printing the messages. Optimization is off, because it would inline all functions."""
     slang, pointer, text = ctypes.CDLL(library), ctypes.c_void_p, ctypes.c_char_p
     for name in ("spCreateSession", "spCreateCompileRequest", "spGetEntryPointCode"):
         getattr(slang, name).restype = pointer

@@ -1,6 +1,7 @@
 """The functions of GLSL.std.450, SPIR-V's standard library, by number.
 
-Powers, roots and inverse functions are built from the vocabulary; outside their domains they are NaN, as on a GPU.
+Powers, roots and inverse functions are composed of functions of `gonio.ops`; outside their domains, they return NaN, as
+on a GPU.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ absolute = _function(np.abs, ops.abs)
 
 
 def _varying(x: Value, like: Value) -> Value:
-    """A value with the lanes of `like`."""
+    """The value with as many lanes as `like`."""
     return x + 0.0 * like if static(x) else x
 
 
@@ -66,7 +67,7 @@ def _power(x: Value, y: Value) -> Value:
         return where(y > 0.0, 0.0 if x == 0.0 else math.nan, math.nan)
     positive = x > 0.0
     value = ops.exp(y * ops.log(ops.where(positive, x, 1.0)))
-    # 0, or NaN where x < 0, by a root: unlike 0 / 0 it is not simplified in emitted text, and its gradient is finite
+    # 0, or NaN where x < 0, by a root: unlike 0 / 0, it is not simplified in emitted text, and its gradient is finite
     domain = ops.sqrt(ops.where(x < 0.0, x, 0.0))
     if static(y) and y <= 0.0:
         return ops.where(positive, value, 1.0 / domain if y < 0.0 else value)
@@ -103,7 +104,7 @@ def sign(x: Value) -> Value:
 
 
 def round_even(x: Value) -> Value:
-    """The nearest integer; halves round to the even one."""
+    """The nearest integer; halves are rounded to the even one."""
     if static(x):
         return folded(np.round, numeric(x))
     below = ops.floor(x)
@@ -133,7 +134,7 @@ def step(edge: Value, x: Value) -> Value:
 
 
 def smoothstep(low: Value, high: Value, x: Value) -> Value:
-    """3 t^2 - 2 t^3, with t from 0 at `low` to 1 at `high`."""
+    """3 t^2 - 2 t^3, where t increases from 0 at `low` to 1 at `high`."""
     t = clamp(divide(subtract(x, low), subtract(high, low)), 0.0, 1.0)
     return multiply(multiply(t, t), subtract(3.0, multiply(2.0, t)))
 
@@ -144,7 +145,7 @@ def scaled(x: Value, exponent: Value) -> Value:
 
 
 def parts(x: Value) -> tuple[Value, Value]:
-    """Fractional and integral part of x, both with its sign."""
+    """The fractional and the integral part of x, both with the sign of x."""
     integral = elementwise(truncated, x)
     return elementwise(subtract, x, integral), integral
 
@@ -155,12 +156,12 @@ def length(v: Value) -> Value:
 
 
 def normalize(v: Value) -> Value:
-    """v (1 / |v|), as GPUs and the vocabulary compute it."""
+    """v (1 / |v|), as computed by GPUs and by `gonio.ops`."""
     return elementwise(multiply, v, divide(1.0, length(v)))
 
 
 def cross(a: tuple[Value, ...], b: tuple[Value, ...]) -> Value:
-    """Vector product."""
+    """Cross product."""
     return tuple(subtract(multiply(a[i], b[j]), multiply(a[j], b[i])) for i, j in ((1, 2), (2, 0), (0, 1)))
 
 
@@ -170,7 +171,7 @@ def reflect(i: Value, n: Value) -> Value:
 
 
 def refract(i: Value, n: Value, eta: Value) -> Value:
-    """The refracted direction; 0 at total reflection."""
+    """The refracted direction; 0 for total internal reflection."""
     cosine = dot(n, i)
     k = subtract(1.0, multiply(multiply(eta, eta), subtract(1.0, multiply(cosine, cosine))))
     inside = numeric(k) < 0.0
@@ -212,7 +213,7 @@ def inverse(m: tuple[Value, ...]) -> Value:
     return transpose(tuple(tuple(cofactor(c, r) for r in places) for c in places))
 
 
-# functions of scalars, applied component by component, by number
+# functions of scalars, which are applied to each component, by number
 ELEMENTWISE: dict[int, Callable[..., Value]] = {
     1: round_even, 2: round_even, 3: truncated, 4: absolute, 6: sign, 8: floor, 9: lambda x: negate(floor(negate(x))),
     10: fract, 11: lambda x: multiply(x, math.pi / 180.0), 12: lambda x: multiply(x, 180.0 / math.pi), 13: sin,

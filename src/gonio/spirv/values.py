@@ -1,7 +1,7 @@
 """Values while a module runs: plain numbers if they are constant, else Dr.Jit values or symbols; composites are tuples.
 
-Plain numbers are folded, so that loops with a counter unroll and a branch on a constant costs nothing. An integer that
-is not constant is represented by a float with an integer value.
+Plain numbers are folded, so that loops with a counter are unrolled and a branch on a constant has no cost. An integer
+that is not constant is represented by a float with an integer value.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Value = Any  # bool, int, float, a Dr.Jit value, a symbol, or a tuple of values
 
 
 class Undefined:
-    """A scalar without a value. Arithmetic propagates it; it is refused if it determines a branch, an index or a
-    result, so that a formula is refused only if it depends on one.
+    """A scalar without a value. It is propagated by arithmetic and rejected if it determines a branch, an index or a
+    result, so that a formula is rejected only if it depends on such a scalar.
 
-    firm  whether it remains undefined where lanes are merged, as an input without a value does. The value of a local
-          variable before its first store does not: lanes that do not read it may take any value.
+    firm  whether it remains undefined where lanes are merged, as for an input without a value. It does not for a local
+          variable before its first store: lanes that do not read the variable may have any value.
     """
 
     __slots__ = ("firm", "hint", "what", "where")
@@ -42,18 +42,18 @@ class Undefined:
         return self.what, self.hint, self.firm, self.where
 
     def at(self, where: str) -> Undefined:
-        """The same scalar with the file and line at which it is read, unless it has them already."""
+        """The same scalar with the file and line at which it is read, unless it already has them."""
         return self if self.where else Undefined(self.what, self.hint, self.firm, where)
 
     def error(self) -> InputError:
-        """The error for its use."""
+        """The error that a use of the scalar causes."""
         return InputError(self.what, self.where, self.hint)
 
 
 class Bits:
     """The bits, as an integer, of a float that is not constant: `number`, or the power of two with a biased exponent.
 
-    part  "magnitude" if the sign is known to be 0, "sign" if only the sign of `number` is left
+    part  "magnitude" if the sign bit is known to be 0, "sign" if only the sign of `number` remains
     """
 
     __slots__ = ("exponent", "number", "part")
@@ -68,11 +68,11 @@ class Bits:
         return Bits(**parts)
 
 
-UNDEFINED: Final = Undefined("a value that nothing computes")
+UNDEFINED: Final = Undefined("a value that is never computed")
 
 
 def refuse(what: str, hint: str = "", where: str = "") -> InputError:
-    """The error for an unsupported construct; the machine adds file and line."""
+    """The error for an unsupported construct, to which the machine adds file and line."""
     return InputError(what, where, hint)
 
 
@@ -128,8 +128,8 @@ def negated(a: Value) -> Value:
 
 
 def select(mask: Value, a: Value, b: Value) -> Value:
-    """`a` where the mask holds, else `b`, part by part for composites; undefined parts take the other value, unless
-    they are firm."""
+    """`a` where the mask is true, else `b`, for each part of a composite; an undefined part is replaced by the other
+    value, unless it is firm."""
     if static(mask):
         return a if mask else b
     if isinstance(a, Undefined) or isinstance(b, Undefined):
@@ -150,7 +150,7 @@ def select(mask: Value, a: Value, b: Value) -> Value:
 
 
 def _merged(a: Value, b: Value) -> Value:
-    """The merged value of two, at least one of which is undefined."""
+    """The merged value of two values, at least one of which is undefined."""
     if not isinstance(a, Undefined):
         a, b = b, a
     if isinstance(b, tuple):
@@ -159,7 +159,7 @@ def _merged(a: Value, b: Value) -> Value:
 
 
 def where(mask: Value, a: Value, b: Value) -> Value:
-    """ops.where on scalars, with a plain number in the precision of the formula."""
+    """ops.where on scalars; plain numbers have the precision of the formula."""
     if static(a) and static(b) and not isinstance(mask, graph.Node):
         a = in_formula(a)
     return ops.where(mask, a, b)
@@ -177,7 +177,7 @@ def leaves(value: Value) -> list[Value]:
 
 
 def folded(function: Any, *values: float) -> float:
-    """A NumPy function of plain numbers, in 64 bits; infinities and NaN as a GPU returns them."""
+    """The result of a NumPy function of plain numbers, in double precision; infinities and NaN are as on a GPU."""
     with np.errstate(all="ignore"):
         return float(function(*[np.float64(value) for value in values]))
 

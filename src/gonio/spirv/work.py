@@ -1,8 +1,8 @@
 """The limits of a call: instructions and time.
 
 A short text can require any amount of work: twenty functions, each of which calls the previous one twice, make a
-million calls. The largest engine shader that we know, that of three-gpu-pathtracer, runs 4,054 instructions; 4,096
-iterations of a loop over a page of code run 200,000.
+million calls. The largest known engine shader, that of three-gpu-pathtracer, executes 4,054 instructions; 4,096
+iterations of a loop over a page of code execute 200,000.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from collections.abc import Iterator
 from .module import Function, Module
 from .values import Value, refuse
 
-MAX_INSTRUCTIONS = 250_000  # per call from outside
-SECONDS = 20.0  # of thread time, per call from outside; a single instruction may compute an array of 65,536 numbers
-COPIED = 256  # numbers of an array whose copy counts as one additional instruction, in time and memory
-_HINT = "store what a function returned and use it again; shorten loops"
+MAX_INSTRUCTIONS = 250_000  # instructions per external call
+SECONDS = 20.0  # thread time per external call; a single instruction may compute an array of 65,536 numbers
+COPIED = 256  # array entries per additional instruction that a copy counts as, in time and memory
+_HINT = "store the result of a function and reuse it; shorten loops"
 
 
 class Work:
-    """The work of a call so far, by function. Raises InputError beyond the limits."""
+    """The work of a call so far, by function. Raises InputError if a limit is exceeded."""
 
     def __init__(self, module: Module) -> None:
         self.module = module
@@ -30,18 +30,19 @@ class Work:
         self.total, self.end = 0, time.thread_time() + SECONDS
 
     def enter(self, function: Function) -> None:
-        """A call begins."""
+        """Count the start of a call."""
         self.calls[function.id] += 1
 
     def step(self, function: Function) -> None:
-        """An instruction runs."""
+        """Count an instruction."""
         self._add(function, 1)
         if time.thread_time() > self.end:
             raise refuse(f"over {SECONDS:g} s to run the shader once: {self._most()}", _HINT)
 
     @contextlib.contextmanager
     def shared(self, function: Function) -> Iterator[None]:
-        """A call that is recorded once for all equal calls; each counts, since each runs when values are computed."""
+        """Count a call that is recorded once for all equal calls; each counts, because each runs when values are
+        computed."""
         before = self.total
         yield
         if self.total > before:
@@ -57,7 +58,7 @@ class Work:
             raise refuse(f"more than {MAX_INSTRUCTIONS:,} instructions: {self._most()}", _HINT)
 
     def copied(self, value: Value) -> None:
-        """A value was created; a large one counts as several instructions."""
+        """Count the creation of a value; a large value counts as several instructions."""
         if isinstance(value, tuple):
             self.total += len(value) // COPIED
 

@@ -1,1 +1,1 @@
-"""Light transport through a scene: integrators, lights, media, random numbers, passes."""
+"""Light transport: integrators, lights, media, samplers, and the passes of a render."""

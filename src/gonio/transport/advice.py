@@ -1,4 +1,4 @@
-"""Advice to the user about the choice of integrator for a scene."""
+"""Advice to the user about the choice of an integrator for a scene."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from .lights.solid_angles import is_sphere
 from .scene_data import SceneData
 
-# Solid angle in steradians: paths that leave mirrors and smooth glass rarely hit a lamp that subtends less than this.
-# The lamp of examples/glass-caustic subtends 0.008 sr.
+# Solid angle in steradians. Paths that leave mirrors and smooth glass rarely hit a lamp with a smaller solid angle.
+# That of the lamp in examples/glass-caustic is 0.008 sr.
 SMALL = 0.03
 
 
 def on_small_lights(data: SceneData) -> str:
-    """A hint if `path` rarely samples the light that mirrors or smooth glass cast on other surfaces; otherwise ""."""
+    """A hint if `path` rarely samples the light that mirrors or smooth glass cast on other surfaces, or ""."""
     if not data.smooth:
         return ""
     mi, flags = data.mi, data.mi.EmitterFlags

@@ -9,7 +9,7 @@ import drjit as dr
 from ..bridge.types import Float, Radiance, Ray, Sensor, UInt
 from .sampler import PairFunction
 
-# Sample dimensions used by the camera: each decision of a sample has a dimension of its own, see `sampler`.
+# The sample dimensions of the camera. Each random decision of a sample has its own dimension, see `sampler`.
 PIXEL, TIME, APERTURE, FIRST_FREE = 0, 1, 2, 3
 
 
@@ -26,7 +26,7 @@ class Camera:
         """A ray through a random point of the pixel, and its weight.
 
         key, index  key of the pixel and index of the sample, see `sampler`
-        wavelength  a number in [0, 1) that selects the wavelengths; None: a separate one for every sample
+        wavelength  a number in [0, 1) that selects the wavelengths; None selects different wavelengths for every sample
         """
         mi = self.mi
         row = pixel // self.width

@@ -1,11 +1,12 @@
-"""Delta-only retrace: a sample that first hits glass is traced a second time through mirrors and glass alone.
+"""Delta-only retrace: a sample that first hits glass is traced a second time, only through mirrors and glass.
 
-Particles do not cover lamps that the camera sees directly through mirrors and glass, and only one path in a thousand
-hits a lamp behind two reflections within a glass ball. The path of such a sample is therefore traced again from the
-camera, with reflection and refraction equally likely, until it hits a lamp or ends. Each of the two traces is weighted
-by its probability of sampling that chain of reflections and refractions (power heuristic).
+Particles do not sample lamps that the camera sees directly through mirrors and glass, and only one path in a thousand
+hits a lamp after two reflections inside a glass ball. The path of such a sample is therefore traced again from the
+camera, with equal probabilities of reflection and refraction, until it hits a lamp or ends. The two paths are weighted
+by their probabilities of sampling the chain of reflections and refractions (power heuristic).
 
-The binary digits of one random number make all choices of a retrace, so the chains of several retraces are stratified.
+The binary digits of one random number determine all choices of a retrace, so the chains of several retraces are
+stratified.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..bridge.types import BSDFContext, BSDFSample, Float, Mask, Shape, UInt
 
-FIRST, DUE, RETRACING = 0, 1, 2  # `Retrace.phase`: the first trace, one after which a retrace follows, and the retrace
+FIRST, DUE, RETRACING = 0, 1, 2  # `Retrace.phase`: the first path, a first path that will be retraced, and the retrace
 
 COSINES = (-1.0, -0.9, -0.5, -0.1, 0.1, 0.5, 0.9, 1.0)  # cosines at which the lobe selection of materials is tested
 STEPS = 65  # random numbers tested per cosine
@@ -28,10 +29,10 @@ END = 2.0**-20  # END and 1 - END select the lobes at the two ends of [0, 1]; no
 
 @dataclass
 class Retrace:
-    """State that a path carries for its retrace.
+    """The state of a path for its retrace.
 
     phase   FIRST, DUE or RETRACING
-    odds    probability that a retrace takes the chain from the camera so far, divided by that of a first trace
+    odds    probability that a retrace samples the current chain from the camera, divided by that of a first path
     number  a number in [0, 1) whose binary digits are the remaining choices of a retrace
     """
 
@@ -49,21 +50,23 @@ class Retrace:
         return self.phase == RETRACING
 
     def weight(self) -> Float:
-        """MIS weight of the light at the end of the chain from the camera."""
-        by_retrace = dr.select(self.odds == 1, 0, dr.rcp(1 + dr.rcp(dr.square(self.odds))))  # 1: no vertex had a choice
+        """The MIS weight of the light at the end of the chain from the camera."""
+        # the odds are 1 if no vertex had a choice
+        by_retrace = dr.select(self.odds == 1, 0, dr.rcp(1 + dr.rcp(dr.square(self.odds))))
         return dr.select(self.retracing, by_retrace, 1 - by_retrace)
 
     def lobe(self, u: Float) -> Float:
-        """The random number that selects a lobe: `u`, or in a retrace one that follows the next digit of `number`."""
+        """The random number that selects a lobe: `u`, or, in a retrace, one given by the next digit of `number`."""
         return dr.select(self.retracing, dr.select(self.number < 0.5, END, 1 - END), u)
 
     def after(self, bs: BSDFSample, delta: Mask, two_ways: Mask, here: Mask) -> tuple[Retrace, Float, Mask]:
-        """(state after a vertex, weight of the path beyond it, whether the path continues).
+        """The state after a vertex, the weight of the rest of the path, and whether the path continues.
 
-        two_ways  whether the surface only reflects as a mirror and transmits
-        here      lanes whose path has hit nothing but mirrors and glass
+        two_ways  whether the surface has only two delta lobes, a mirror reflection and a transmission
+        here      lanes whose path has hit only mirrors and glass
         """
-        # A retrace takes two delta lobes with equal probability, a single one always, and stops at anything else.
+        # A retrace selects one of two delta lobes with equal probability, always follows a single delta lobe, and ends
+        # at any other surface.
         sole = delta & (bs.pdf > 1 - END)
         fork = here & delta & two_ways & ~sole
         odds = self.odds * dr.select(here & ~sole, dr.select(fork & (bs.pdf > END), 0.5 / bs.pdf, 0), 1)
@@ -78,22 +81,22 @@ class Retrace:
         return after, weight, ~self.retracing | (odds > 0)
 
     def begin(self, retraced: Mask, number: Float) -> Retrace:
-        """The initial state of a path; on the lanes `retraced`, that of the retrace that was due."""
+        """The initial state of the next path; on the lanes `retraced`, that of the retrace."""
         return replace(self, phase=dr.select(retraced, type(self.phase)(RETRACING), self.phase), number=number)
 
 
 def reflects_and_transmits(mi: ModuleType, flags: UInt) -> Mask:
-    """Whether a surface has a mirror reflection, a straight or refracted transmission, and no other lobe."""
+    """Whether a surface has exactly two lobes, a mirror reflection and a straight or refracted transmission."""
     kinds = mi.BSDFFlags
     through = mi.has_flag(flags, kinds.DeltaTransmission) ^ mi.has_flag(flags, kinds.Null)
     return mi.has_flag(flags, kinds.DeltaReflection) & through & ~mi.has_flag(flags, kinds.Smooth)
 
 
 def is_possible(mi: ModuleType, context: BSDFContext, smooth: list[Shape]) -> bool:
-    """Whether the scene has surfaces with two delta lobes, each selected by one end of the lobe's random number.
+    """Whether the scene has surfaces with two delta lobes that are selected by low and by high random numbers.
 
-    Materials may be user-defined, so this is tested by sampling them; False if the lobe of any of them changes more
-    than once as the number increases.
+    Materials may be user-defined, so this is tested by sampling them. The result is False if, for any material, the
+    lobe changes more than once as the random number increases.
     """
     plugins = {id(plugin): plugin for plugin in (shape.bsdf() for shape in smooth)}.values()
     asked = [plugin for plugin in plugins if reflects_and_transmits(mi, mi.UInt32(+plugin.flags()))[0]]
@@ -109,7 +112,7 @@ def is_possible(mi: ModuleType, context: BSDFContext, smooth: list[Shape]) -> bo
     for plugin in asked:
         bs, _ = plugin.sample(context, si, u, mi.Point2f(0.5))
         first = np.array(mi.Float(bs.wo.z * cosine)).reshape(shape) < 0
-        first = first == first[:, :1]  # where the lobe is that of the smallest number; `likely` is its probability
+        first = first == first[:, :1]  # whether the lobe is that of the smallest number; `likely` is its probability
         likely = np.array(mi.Float(bs.pdf) + 0 * cosine).reshape(shape)[:, 0]
         changes = np.sum(first[:, 1:] != first[:, :-1], axis=1)
         if np.any(changes > 1) or not np.all(abs(first.mean(1) - likely) < 2 / STEPS):

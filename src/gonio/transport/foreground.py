@@ -1,12 +1,12 @@
-"""Surfaces without their background: radiance and coverage, for comparison with a picture drawn by a GPU.
+"""Render surfaces without a background, as radiance and coverage, for comparison with a picture drawn by a GPU.
 
     >>> render = Foreground(balls, Settings("direct"), lights=lamps)
     >>> render.advance(16)
-    >>> render.image()              # (height, width, 4): light of the surfaces alone, and coverage
+    >>> render.image()              # (height, width, 4): light from the surfaces only, and coverage
 
-The lights may be in a separate scene. Then every point of a surface is lit by all of them without occlusion: no shadow
-rays are traced, and no surface illuminates another. This is what a fragment shader computes, and it is physically
-correct if every surface is isolated and convex.
+The lights may be in a separate scene. In this case, every point of a surface is lit by all lights without occlusion: no
+shadow rays are traced, and surfaces do not illuminate each other. A fragment shader computes the same. The result is
+physically correct if there is only one surface and it is convex.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from .scene_data import SceneData
 
 
 class Foreground(Render):
-    """A render whose camera sees surfaces only, neither lights nor environment.
+    """A render in which the camera sees only surfaces, but neither lights nor the environment.
 
-    scene   the surfaces
-    lights  a scene that contains the lights alone; None if they are in `scene`, with all shadows
+    scene   scene with the surfaces
+    lights  scene with only the lights; None if the lights are in `scene`, where surfaces cast shadows
     """
 
     features = 1
@@ -49,12 +49,15 @@ class Foreground(Render):
         return super()._integrator_of(_SurfacesOnly if self._lights is None else partial(_LightsApart, self._lights))
 
     def image(self) -> NDArray[np.float32]:
-        """(height, width, 4) float32: linear RGB, averaged over the whole pixel, and coverage; row 0 on top."""
+        """The picture: linear RGB, averaged over the whole pixel, and coverage, (height, width, 4), float32.
+
+        Row 0 is on top.
+        """
         return self._mean([*self._sums.radiance, *self._sums.features])
 
 
 class _SurfacesOnly(SceneData):
-    """A scene whose paths begin at surfaces only; the feature is coverage, 1 where a surface was hit."""
+    """A scene in which paths begin only at surfaces. The feature is the coverage, 1 if a surface is hit."""
 
     def begins_path(self, hit: Hit) -> Mask:
         return hit.is_valid()
@@ -64,7 +67,7 @@ class _SurfacesOnly(SceneData):
 
 
 class _LightsApart(_SurfacesOnly):
-    """A scene whose paths begin at surfaces only, under the unoccluded lights of another scene, `apart`."""
+    """A scene in which paths begin only at surfaces, lit without occlusion by the lights of another scene, `apart`."""
 
     def __init__(self, apart: Scene, *parts: Any, **options: Any) -> None:
         super().__init__(*parts, **options)
@@ -79,13 +82,13 @@ class _LightsApart(_SurfacesOnly):
 
 
 class _Transparent(Lights):
-    """Lights that do not occlude each other: a ray collects every lamp along it, and the environment behind them.
+    """Lights that do not occlude each other: a ray collects the light of all lamps along it and of the environment.
 
-    Light sampling traces no shadow rays here, so lights hit by a BSDF sample must not be occluded either.
+    Light sampling traces no shadow rays here, so lights that a BSDF sample hits must not be occluded either.
     """
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:
-        """All lights on the ray, each with its own density."""
+        """All lights along the ray, each with its density."""
         if self.shortens_last_ray or self.count == 0:
             return super().along(ray, solid_angle, active)
         mi, origin = self.mi, ray.o

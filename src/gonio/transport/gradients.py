@@ -1,13 +1,13 @@
-"""Derivatives of a picture with respect to parameter values of the scene's materials.
+"""The derivatives of a picture with respect to parameters of the materials in a scene.
 
     render = Gradients(scene, settings, [Along(plugin, "alpha")])
     render.advance(64)
     render.image(), render.slopes()         # (H, W, 3), and a list of one such array per value
 
-The paths are those of the integrator itself: their directions and densities stay fixed while a value changes (detached
+The paths are those of the integrator. Their directions and densities do not depend on the parameter (detached
 sampling), and the light that the materials scatter along them is differentiated (attached evaluation). This is unbiased
-for every value that does not move the paths; see Vicini2021 for the theory. Derivatives are propagated forward along
-the path with its throughput, so one traversal gives the picture and all derivatives.
+for every parameter that does not move the paths; see Vicini2021 for the theory. The derivatives are propagated forward
+along the path, like the throughput, so one traversal gives the picture and all derivatives.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from .scene_data import SceneData
 
 @dataclass(frozen=True)
 class Along:
-    """The variable of a derivative: a value of a material, or a channel of a color.
+    """The variable of a derivative: a parameter of a material, or a channel of a color.
 
-    plugin   the material in the scene, one of Gonio's
-    path     name of the value in the material: "alpha", "base.alpha"
-    channel  0 to 2; None: all channels together, or both alphas of a pair
+    plugin   the material in the scene, which must be one of Gonio's
+    path     path of the parameter in the material, such as "alpha" or "base.alpha"
+    channel  index of a channel, 0 to 2; None for all channels together, or for both alphas of a pair
     """
 
     plugin: BSDFPlugin
@@ -61,9 +61,9 @@ class Along:
 
 
 class Gradients(Render):
-    """A render that also computes derivatives: `slopes` in addition to `image`.
+    """A render that computes derivatives, returned by `slopes`, in addition to the picture, returned by `image`.
 
-    Raises InputError for integrators and values without derivatives.
+    Raises InputError for integrators and parameters without derivatives.
     """
 
     def __init__(self, scene: Scene, settings: Settings, along: Sequence[Along], sensor: Sensor | None = None):
@@ -91,13 +91,13 @@ class Gradients(Render):
         return _ForwardDerivatives(walked, self.along)
 
     def slopes(self) -> list[NDArray[np.float32]]:
-        """The picture's derivative with respect to each value: arrays of shape (height, width, 3)."""
+        """The derivatives of the picture with respect to each parameter, as arrays of shape (height, width, 3)."""
         return [self._mean(self._sums.features[3 * i : 3 * i + 3]) for i in range(len(self.along))]
 
 
 @dataclass
 class _Derivatives:
-    """A path, and for each value the derivatives of its throughput and of its radiance."""
+    """A path, and the derivatives of its throughput and of its radiance with respect to each parameter."""
 
     path: PathState
     throughput: list[Radiance]
@@ -105,7 +105,7 @@ class _Derivatives:
 
 
 class _ForwardDerivatives(Integrator):
-    """The paths of another integrator, bounce by bounce, with derivatives.
+    """Traces the paths of another integrator and computes derivatives at each vertex.
 
     walked  the integrator that generates the paths
     """
@@ -118,7 +118,7 @@ class _ForwardDerivatives(Integrator):
         self.attached = scattering
 
     def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
-        """[r, g, b] of a sample, and of its derivative with respect to each value."""
+        """The color of a sample, [r, g, b], followed by its derivative with respect to each parameter."""
         mi = self.mi
         zeros = [mi.Spectrum(0) for _ in self.along]
         state = _Derivatives(self.walked.camera_path(pixel, key, index), zeros, list(zeros))
@@ -137,7 +137,7 @@ class _ForwardDerivatives(Integrator):
         return values
 
     def bounce(self, state: _Derivatives, key: UInt) -> _Derivatives:
-        """One vertex of the path, with the derivatives propagated by the chain rule."""
+        """Process one vertex of the path, and propagate the derivatives by the chain rule."""
         path, mi = state.path, self.mi
         with dr.resume_grad():
             throughput, radiance = mi.Spectrum(path.throughput), mi.Spectrum(path.radiance)
@@ -165,7 +165,7 @@ class _ForwardDerivatives(Integrator):
 
 
 class _AttachedData(SceneData):
-    """A scene whose materials are differentiated with respect to some values."""
+    """A scene whose materials are differentiated with respect to some of their parameters."""
 
     def __init__(self, along: Sequence[Along], *parts: Any, **options: Any) -> None:
         super().__init__(*parts, **options)
@@ -177,7 +177,7 @@ class _AttachedData(SceneData):
 
 
 class _AttachedScattering(Scattering):
-    """BSDFs whose values and weights have derivatives, while their sampled directions and densities have none."""
+    """BSDFs whose values and weights have derivatives, but whose sampled directions and densities have none."""
 
     def __init__(self, mi: ModuleType, media: Media, along: Sequence[Along]) -> None:
         super().__init__(mi, media)
@@ -190,7 +190,7 @@ class _AttachedScattering(Scattering):
         self._values: dict[Slot, dict[str, Float]] = {}
 
     def fresh_values(self) -> dict[Slot, dict[str, Float]]:
-        """New copies of the differentiated values, which the materials use from now on."""
+        """New copies of the differentiated parameters, which the materials use from then on."""
         self._values = {one: {key: type(v)(v) for key, v in one.values.items()} for one in self.slots}
         return self._values
 
@@ -213,7 +213,7 @@ class _AttachedScattering(Scattering):
     def _attach(
         self, vertex: Vertex, toward: Vector, value: Radiance, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> tuple[Radiance, Radiance]:
-        """The given value toward a light and weight of a sample, with the derivatives of the materials attached."""
+        """The given value toward a light and the given weight of a sample, with the derivatives of the materials."""
         mi, si = self.mi, vertex.si
         outer = 1.0 + si.duv_dx.x if self.media.known else None
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
@@ -229,7 +229,7 @@ class _AttachedScattering(Scattering):
 
     @contextmanager
     def _differentiated(self) -> Iterator[None]:
-        """Inside the block, materials use the differentiated values and recompute the quantities derived from them."""
+        """Inside the `with` block, materials use the differentiated parameters and quantities derived from them."""
         before = [(slot, slot.values) for slot in self.slots]
         derived = [(placed, placed.derived) for plugin in self.plugins for placed in _with_inner(plugin.placed)]
         try:
@@ -246,7 +246,7 @@ class _AttachedScattering(Scattering):
 
 
 def _with_inner(placed: PlacedMaterial) -> Iterator[PlacedMaterial]:
-    """A placed material and those nested in it."""
+    """A placed material and all materials nested in it."""
     yield placed
     for _, held in placed.inner.values():
         if isinstance(held, PlacedMaterial):

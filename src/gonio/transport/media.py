@@ -1,12 +1,12 @@
-"""Media between surfaces: absorption, and which of several overlapping media applies.
+"""Media between surfaces: absorption, and the priorities of overlapping media.
 
-Following Schmidt2002, every medium has a priority, and where several overlap, the highest one applies: water that
-extends slightly into the glass around it has no surface there. A surface is real only if the highest media on its two
-sides differ; light passes straight through any other. At equal priority, the material that the scene names first is
-higher.
+Every medium has a priority, and where several media overlap, the one with the highest priority applies (Schmidt2002).
+For example, water that extends slightly into the glass around it has no surface inside the glass. A surface is real
+only if the media with the highest priority on its two sides differ; light passes straight through all other surfaces.
+If priorities are equal, the material that the scene names first has the higher priority.
 
-A path stores how many times it is inside each medium: four bits per medium in one number, in the order of priorities,
-so that the highest medium is that of the number's highest bit.
+A path counts how many times it is inside each medium. The counts are stored in one number, with four bits per medium in
+the order of priorities, so the highest bit belongs to the medium with the highest priority.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from ..bridge.types import BSDFPlugin, Float, Mask, Point, Radiance, Scene, Surf
 from ..errors import InputError
 from ..material.bsdf import Interior
 
-MAX_MEDIA = 8  # with four bits each in a 32-bit number
-CROSSINGS = 256  # largest number of surfaces between the camera and the outside of the scene
+MAX_MEDIA = 8  # maximum number of media, with four bits each in a 32-bit number
+CROSSINGS = 256  # maximum number of surfaces between the camera and the outside of the scene
 
 
 class Crossing(NamedTuple):
-    """A surface that a path hits, in terms of media.
+    """The media at a surface that a path hits.
 
-    here     the path's media before the surface
-    beyond   the path's media beyond the surface
-    surface  whether it is a real surface; otherwise light passes straight through
-    outer    index of refraction of the medium adjacent to the surface's own
+    here     media of the path before the surface
+    beyond   media of the path beyond the surface
+    surface  whether the surface is real; otherwise, light passes straight through
+    outer    index of refraction of the medium outside the surface
     """
 
     here: UInt
@@ -43,7 +43,10 @@ class Crossing(NamedTuple):
 
 
 class Media:
-    """The media of a scene; unless one absorbs or has a priority, `known` is False and they are not tracked."""
+    """The media of a scene.
+
+    known  whether media are tracked along paths, because at least one of them absorbs light or has a priority
+    """
 
     def __init__(self, mi: ModuleType, scene: Scene):
         self.mi, self.scene = mi, scene
@@ -64,7 +67,7 @@ class Media:
         dr.make_opaque(self.place)
 
     def containing(self, point: Point) -> UInt:
-        """The media that contain a point: those that a ray from there leaves without having entered them."""
+        """The media that contain a point: those that a ray from the point leaves without having entered them."""
         mi, depth, inside = self.mi, [0] * MAX_MEDIA, [0] * MAX_MEDIA
         offsets = Offsets(mi, self.scene)
         ray = mi.Ray3f(point, dr.normalize(mi.Vector3f(0.29, 0.83, 0.47)))
@@ -81,7 +84,7 @@ class Media:
         return dr.opaque(mi.UInt32, packed)
 
     def crossing(self, si: SurfaceInteraction, bsdf: BSDFPlugin, inside: UInt, active: Mask) -> Crossing:
-        """The media on the two sides of a surface that is hit from within the media `inside`."""
+        """The media on the two sides of a surface that a path hits inside the media `inside`."""
         mi = self.mi
         number = self._number(bsdf, active)
         medium = active & (number < MAX_MEDIA)
@@ -90,30 +93,30 @@ class Media:
         counted = (inside & (15 * one)) != 0  # False if the path began inside, or if the surface is not closed
         others = dr.select(entering | ~counted, inside, inside - one)
         beyond = dr.select(medium, dr.select(entering, inside + one, others), inside)
-        surface = ~medium | (others < one)  # all others have lower priority
+        surface = ~medium | (others < one)  # all other media have a lower priority
         return Crossing(inside, beyond, surface, self.eta(others, si))
 
     def eta(self, inside: UInt, si: SurfaceInteraction) -> Float:
-        """Index of refraction of the highest of these media; 1 outside all media."""
+        """The index of refraction of the medium with the highest priority; 1 outside all media."""
         value = self.mi.Float(1.0)
         for here, interior in self._each(inside, si):
             value = dr.select(here, interior.eta, value)
         return value
 
     def absorption(self, inside: UInt, si: SurfaceInteraction) -> Radiance:
-        """Absorption coefficient of the highest of these media."""
+        """The absorption coefficient of the medium with the highest priority."""
         value = self.mi.UnpolarizedSpectrum(0.0)
         for here, interior in self._each(inside, si):
             value = dr.select(here, interior.absorption, value)
         return value
 
     def transmitted(self, inside: UInt, si: SurfaceInteraction, length: Float) -> Radiance:
-        """Transmittance of the highest of these media over a length: exp(-absorption length) (Beer and Lambert)."""
+        """The transmittance of the medium of highest priority over a length, exp(-absorption length) (Beer-Lambert)."""
         loss = self.absorption(inside, si)
         return self.mi.Spectrum(dr.select(loss > 0.0, dr.exp(-loss * length), 1.0))
 
     def _each(self, inside: UInt, si: SurfaceInteraction) -> Iterator[tuple[Mask, Interior]]:
-        """Each medium, and the lanes where it is the highest."""
+        """Each medium, and the lanes on which it has the highest priority."""
         for number, bsdf in enumerate(self.bsdfs):
             lowest = 1 << (4 * number)
             here = (inside >= lowest) & ((inside >> (4 * number)) <= 15)
@@ -122,12 +125,12 @@ class Media:
             yield here, interior
 
     def _number(self, bsdf: BSDFPlugin, active: Mask = True) -> UInt:
-        """Index of a surface's material in the order of priorities, MAX_MEDIA for one without an interior."""
+        """The index of a surface's material in the order of priorities; MAX_MEDIA if it has no interior."""
         return dr.gather(self.mi.UInt32, self.place, dr.reinterpret_array(self.mi.UInt32, bsdf), active)
 
 
 def _interiors(scene: Scene) -> Iterator[BSDFPlugin]:
-    """Gonio's plugins that have an interior, each once, in the order of the scene."""
+    """Gonio's plugins that have an interior, without duplicates, in the order of the scene."""
     visited: set[int] = set()
     for shape in scene.shapes():
         bsdf = shape.bsdf()
@@ -140,5 +143,5 @@ def _interiors(scene: Scene) -> Iterator[BSDFPlugin]:
 
 
 def _pointers(mi: ModuleType, scene: Scene) -> list[int]:
-    """The numbers that kernels hold for the materials."""
+    """The numbers that represent the materials in kernels."""
     return [int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(shape.bsdf()))[0]) for shape in scene.shapes()]

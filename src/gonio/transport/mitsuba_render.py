@@ -1,4 +1,4 @@
-"""A scene rendered by one of Mitsuba's own integrators, in passes."""
+"""Render a scene with one of Mitsuba's own integrators, in passes."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ..bridge.types import Plugin, Scene
 from ..errors import InputError
 from .passes import power_of_two
 
-# Samples per pass of Mitsuba's own integrators, which hold one per lane: about half a second on a CPU.
+# Samples per pass of Mitsuba's own integrators, which process one sample per lane; a pass takes about 0.5 s on a CPU.
 WAVEFRONT = 1 << 21
 
 
 class MitsubaRender:
-    """A Mitsuba scene rendered by one of Mitsuba's integrators, in passes of `pass_size` samples, one seed each.
+    """A render with one of Mitsuba's integrators, in passes of `pass_size` samples, each with its own seed.
 
-    The picture depends on the seed and the film, not on timing, except for the last bits: Mitsuba's film is accumulated
-    with atomics, in arbitrary order. A sampler that needs a square number of samples (stratified, multijitter) rounds
-    each pass up; `done` counts the samples actually taken.
+    The picture depends on the seed and the film, but not on timing, except for its last bits: Mitsuba accumulates the
+    film with atomic operations in arbitrary order. A sampler that requires a square number of samples (stratified,
+    multijitter) rounds this number up in each pass; `done` is the number of samples actually taken.
     """
 
     def __init__(
@@ -47,10 +47,10 @@ class MitsubaRender:
         self.done = 0
 
     def advance(self, count: int) -> None:
-        seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # distinct from the passes of neighboring seeds
+        seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # differs from those of passes of adjacent seeds
         picture = self._render(self._integrator, count, seed)
         samples = int(self._sensor.sampler().sample_count())
-        # In float64: a sum of thousands of float32 passes would lose digits.
+        # in float64, because a float32 sum over thousands of passes would lose digits
         weighted = picture.astype(np.float64) * samples
         if self._sum is not None and self._sum.shape != weighted.shape:
             what = f"the picture has {weighted.shape[2]} channels, but the checkpoint has {self._sum.shape[2]}"
@@ -60,13 +60,15 @@ class MitsubaRender:
         self.done += samples
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """The sum so far, with the number and size of its passes."""
+        """The accumulated samples, with the number and the size of the passes."""
         assert self._sum is not None, "advance() comes first"
         return {"sum": self._sum, "passes": np.array([self._passes, self.pass_size], np.int64)}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Resume with the next pass; only the last bits of the picture may differ. Raises ValueError or KeyError for
-        sums of another film."""
+        """Continue with the next pass. Only the last bits of the picture may differ.
+
+        Raises ValueError or KeyError if the state is that of another film.
+        """
         width, height = self._sensor.film().crop_size()
         total, passes = state["sum"], state["passes"]
         fits = total.ndim == 3 and total.shape[:2] == (int(height), int(width)) and total.shape[2] > 0
@@ -88,7 +90,7 @@ class MitsubaRender:
         return np.repeat(mean[..., :1], 3, axis=2) if mean.shape[2] < 3 else mean[..., :3]
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
-        """Guides for the denoiser: 16 samples per pixel cover every surface that matters for edges."""
+        """The features for the denoiser, with 16 samples per pixel, which suffice for all edges."""
         aovs = self._mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
         channels = self._render(aovs, 16, self._seed)[..., -6:]
         return {"albedo": channels[..., :3], "normal": channels[..., 3:]}

@@ -1,9 +1,10 @@
-"""Trace particles from the lamps: the steps that `light` and `caustics` share.
+"""Trace particles from the lamps: the steps that `light` and `caustics` have in common.
 
     leave -> [ intersect -> sample_bsdf, eval_bsdf -> follow ]
 
-A particle arrives at a surface with a flux and is scattered by the adjoint BSDF: the factor (eta_o / eta_i)^2 for
-radiance is omitted, and where shading and geometric normals differ, the flux is corrected (Veach1997, sec. 5.3).
+A particle arrives at a surface with a flux and is scattered by the adjoint BSDF. The factor (eta_o / eta_i)^2 for
+radiance is therefore omitted, and the flux is corrected where the shading and geometric normals differ (Veach1997, sec.
+5.3).
 """
 
 from __future__ import annotations
@@ -31,38 +32,39 @@ from .lights.sources import Particle, Sources, Targets
 from .scattering import Vertex, keep_hero
 from .scene_data import SceneData
 
-# Sample dimensions of a particle at the lamp and at each vertex.
+# The sample dimensions of a particle at the lamp and at each vertex
 PICK, PLACE, WAY, AIM, FIRST_VERTEX = 0, 1, 2, 3, 4
 DIRECTION, LOBE, LENS, VERTEX_DIMENSIONS = 0, 1, 2, 3
 
-ROULETTE_DEPTH = 5  # segments, as for paths
+ROULETTE_DEPTH = 5  # number of segments, as for paths
 
 
 @dataclass
 class Flight:
-    """The state of particles, one per lane."""
+    """The state of the particles, one per lane."""
 
-    depth: UInt  # segments traced, including the one to `hit`
+    depth: UInt  # number of segments traced, including the one to `hit`
     ray: Ray
     hit: Hit
-    flux: Radiance  # at the lamp
+    flux: Radiance  # flux at the lamp
     throughput: Radiance  # fraction of the flux that remains
-    eta: Float  # product of the relative indices: the current index divided by that at the start
+    eta: Float  # product of the relative indices: the current index of refraction divided by that at the lamp
     hero_only: UInt
     inside: UInt
     active: Mask
 
     @property
     def dimension(self) -> UInt:
-        """Dimension of the first random number at the next vertex."""
+        """The dimension of the first random number at the next vertex."""
         return self.depth * VERTEX_DIMENSIONS + (FIRST_VERTEX - VERTEX_DIMENSIONS)
 
 
 class Particles:
-    """The particles of a picture. They form one sequence: particle n = (low, high) is the same wherever it is traced.
+    """The particles of a picture. They form one sequence: particle n = (low, high) does not depend on where it is
+    traced.
 
     max_depth  maximum path length in segments, as kernel data
-    targets    the spheres at which particles are aimed; None: they leave in all directions
+    targets    spheres toward which particles are emitted; None for all directions
     """
 
     def __init__(self, data: SceneData, seed: int, max_depth: UInt, targets: Targets | None = None) -> None:
@@ -75,21 +77,21 @@ class Particles:
         self.bent = bends_normals(data.scene)
 
     def key(self, high: UInt) -> UInt:
-        """The sampler's key for particles whose number has these upper 32 bits."""
+        """The key of the sampler for particles whose numbers have the given upper 32 bits."""
         return sampler.pixel_key(high, self.seed)
 
     def number(self, index: UInt, pixel: UInt, pixels: UInt) -> tuple[UInt, UInt]:
-        """(key, lower 32 bits of the number) of the particle for a sample of a pixel."""
+        """The key, and the lower 32 bits of the number, of the particle for a sample of a pixel."""
         mi = self.mi
         number = mi.UInt64(index) * mi.UInt64(pixels) + mi.UInt64(pixel)
         low = mi.UInt32(number)
         return self.key(mi.UInt32(number >> 32)), low
 
     def leave(self, key: UInt, low: UInt, wavelength: Float | None = None) -> tuple[Particle, Flight]:
-        """Particle `low` as it leaves its lamp, and its flight to the first surface that it hits.
+        """Particle `low` when it leaves its lamp, and its state at the first surface that it hits.
 
-        wavelength  a number in [0, 1) that selects the wavelengths at which the flux is given; None: the particle
-                    samples its own, and its flux is weighted by their density
+        wavelength  a number in [0, 1) that selects the wavelengths of the flux; if it is None, the wavelengths are
+                    sampled for each particle, and the flux is weighted by their density
         """
         mi, data = self.mi, self.data
         pick, color = data.pair(key, low, PICK)
@@ -99,7 +101,7 @@ class Particles:
         particle = self.sources.sample(pick, place, data.pair(key, low, AIM)[0], way, wavelengths)
         particle.flux *= weight
         particle.direct_weight *= weight
-        ray = data.surfaces.offsets.ray(particle.place, particle.direction)  # off the lamp's own surface
+        ray = data.surfaces.offsets.ray(particle.place, particle.direction)  # begins off the surface of the lamp
         ray.o = dr.select(particle.place.is_valid(), ray.o, particle.origin)
         ray.wavelengths = wavelengths
         active = mi.Bool(True) & dr.any(particle.flux != 0) & (self.max_depth > 1)
@@ -119,7 +121,7 @@ class Particles:
         return particle, flight
 
     def intersect(self, flight: Flight) -> Vertex:
-        """The surface that a particle hits; media along the ray attenuate its throughput. Traces no ray."""
+        """The surface that a particle has hit, with the throughput attenuated by media along the ray. Traces no ray."""
         data, active = self.data, flight.active
         vertex, throughput = data.vertex(flight.hit, flight.ray, flight.inside, flight.throughput, active)
         flight.throughput = throughput
@@ -129,7 +131,7 @@ class Particles:
         return vertex
 
     def sample_bsdf(self, key: UInt, low: UInt, flight: Flight, vertex: Vertex) -> tuple[BSDFSample, Radiance]:
-        """A scattered direction, and the weight of the flux in that direction."""
+        """Sample a scattered direction. Also returns the weight of the flux in this direction."""
         mi, data, si, active = self.mi, self.data, vertex.si, flight.active
         lobe, _ = data.pair(key, low, flight.dimension + LOBE)
         u = mi.Point2f(*data.direction_pair(key, low, flight.dimension + DIRECTION))
@@ -148,7 +150,7 @@ class Particles:
         si, bsdf = vertex.si, vertex.bsdf
         if not self.bent:
             return bsdf.eval(self.context, si, toward, active) * adjoint(si, toward)
-        # Evaluated in reverse, as radiance: glass scales radiance but not importance.
+        # The BSDF is evaluated in reverse, as radiance, because glass scales radiance but not importance.
         reverse = self.mi.SurfaceInteraction3f(si)
         reverse.wi = toward
         into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(toward)))
@@ -156,7 +158,7 @@ class Particles:
         return value * (out / dr.maximum(into, 1e-12))
 
     def through_media(self, vertex: Vertex, value: Radiance, ds: DirectionSample) -> Radiance:
-        """The light that a vertex sends toward the camera, after absorption by media."""
+        """The light from a vertex to the camera after absorption by media."""
         if vertex.crossing is None:
             return value
         side = vertex.side(vertex.si.to_local(ds.d))
@@ -165,7 +167,7 @@ class Particles:
     def follow(
         self, key: UInt, low: UInt, flight: Flight, vertex: Vertex, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> Flight:
-        """The flight to the next surface, in the direction of a sample."""
+        """The state at the next surface in the direction of a sample."""
         data, si = self.data, vertex.si
         throughput = flight.throughput * weight
         active = active & dr.any(throughput != 0) & (flight.depth + 1 < self.max_depth)
@@ -182,9 +184,11 @@ class Particles:
 
 
 def adjoint(si: SurfaceInteraction, wo: Vector, normal: Vector | None = None) -> Float:
-    """Factor of a particle's flux where shading normal s and geometric normal g differ: |wi.s wo.g / (wi.g wo.s)|.
+    """The factor of a particle's flux where the shading normal s and the geometric normal g differ.
 
-    normal  s, if it is not the surface's shading normal
+    It is |wi.s wo.g / (wi.g wo.s)|.
+
+    normal  s, if it differs from the shading normal of the surface
     """
     into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(wo)))
     shading = si.sh_frame.n if normal is None else normal

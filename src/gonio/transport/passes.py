@@ -1,8 +1,8 @@
-"""The loop of a render: passes of about half a second, progress, Ctrl-C, time limit.
+"""The loop of a render: passes of about half a second, with progress reports, Ctrl-C and a time limit.
 
-The size of the passes depends on timing, but the picture does not: `integrators.Render` numbers its samples and sums
-them in order. A Mitsuba scene with its own integrator has no such numbering, so its passes have a fixed size that
-depends on the film only; it also bounds the memory, which there grows with the samples of a pass.
+The size of the passes depends on timing, but the picture does not, because `integrators.Render` numbers its samples and
+accumulates them in order. Mitsuba's own integrators do not number samples, so their passes have a fixed size, which
+depends only on the film. This size also bounds the memory, which grows with the number of samples in a pass.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-PASS_SECONDS = 0.5  # long compared with a pass's overhead (about 10 ms), short enough to react to Ctrl-C
+PASS_SECONDS = 0.5  # long compared to the overhead of a pass (about 10 ms), but short enough to react to Ctrl-C
 
-FIRST_PASS = 1 << 18  # samples: about 50 ms, for a first picture soon after compilation
+FIRST_PASS = 1 << 18  # number of samples, which take about 50 ms, for a first picture soon after compilation
 
-# Signals that end a render: that of Ctrl-C, those of batch systems, that of a closing terminal; Windows lacks some.
+# The signals that end a render: Ctrl-C, termination by a batch system, and a closed terminal; Windows lacks some.
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class Renders(Protocol):
-    """A render that `run` can drive: `gonio.transport.integrators.Render`, `mitsuba_render.MitsubaRender`."""
+    """The interface of renders that `run` advances, such as `integrators.Render` and `mitsuba_render.MitsubaRender`."""
 
     @property
     def done(self) -> int: ...
@@ -48,7 +48,7 @@ class Renders(Protocol):
 
 @dataclass(frozen=True)
 class Progress:
-    """The progress of a render: samples per pixel done and wanted, samples per second, estimated seconds left."""
+    """The progress of a render: finished and requested samples per pixel, samples per second, and remaining seconds."""
 
     done: int
     wanted: int
@@ -67,17 +67,17 @@ def run(
     interrupted: Callable[[], object] = lambda: False,
     clock: Callable[[], float] = time.perf_counter,
 ) -> str:
-    """Advance `render` to `spp` samples per pixel; return why it ended: "" (done), "interrupt" or "timeout".
+    """Advance a render to `spp` samples per pixel. Returns why it ended: "" (done), "interrupt" or "timeout".
 
-    At least one pass is made if samples are missing, so that there is always a picture. Interrupts and the time limit
-    are checked between passes; near the time limit the passes shrink to fit.
+    If samples are missing, at least one pass is rendered, so there is always a picture. Interrupts and the time limit
+    are checked between passes; near the time limit, passes become shorter.
 
-    spp          a number, or a function that is called after each pass; no pass goes beyond its latest value
+    spp          a number, or a function that is called after each pass; no pass exceeds its latest value
     pixels       number of pixels of the picture
-    timeout      time limit, in the unit of `clock` (s); None: none
-    first        samples per pixel of the first pass, if the rate is known; with 0, the first pass is short
+    timeout      time limit in the unit of `clock` (s); None for no limit
+    first        samples per pixel of the first pass, if the speed is known; 0 for a short first pass
     report       called with the progress after each pass
-    interrupted  called after each pass; a true result ends the render
+    interrupted  called after each pass; if the result is true, the render ends
     """
     begin = clock()
     fixed = getattr(render, "pass_size", None)  # passes of a Mitsuba scene have a fixed size
@@ -92,7 +92,7 @@ def run(
         render.advance(min(count, wanted - render.done))
         wanted = goal()
         elapsed, samples = max(clock() - started, 1e-9), (render.done - before) * pixels
-        # The first pass also compiles; it does not measure the rate unless it is the only one.
+        # The first pass includes the compilation, so its speed is used only if it is the only pass.
         if compiled or render.done >= wanted:
             counted_samples, counted_seconds = counted_samples + samples, counted_seconds + elapsed
         rate = counted_samples / counted_seconds if counted_seconds else samples / elapsed
@@ -114,23 +114,25 @@ def run(
 
 
 def _next_count(count: int, elapsed: float, compiled: bool) -> int:
-    """Samples per pixel for a pass of about PASS_SECONDS, at most 8 times as many as in the last one."""
-    if not compiled and elapsed > PASS_SECONDS:  # probably the compilation
+    """The number of samples per pixel for a pass of about PASS_SECONDS, at most 8 times that of the last pass."""
+    if not compiled and elapsed > PASS_SECONDS:  # probably because of the compilation
         return count
     return max(1, round(count * min(PASS_SECONDS / elapsed, 8)))
 
 
 def power_of_two(x: float) -> int:
-    """The largest power of two not above x, at least 1."""
+    """The largest power of two that does not exceed x; at least 1."""
     return 1 << max(int(x).bit_length() - 1, 0)
 
 
 class Interrupts:
-    """While entered, the first signal that would end the process sets `asked` to its number, and a later Ctrl-C ends
-    the process at once. A later SIGTERM or SIGHUP does not, since systemd sends the two together.
+    """A context manager that catches signals which would end the process.
 
-    A Python signal handler runs only between two instructions of Python, and a pass is one long call. Therefore a
-    separate thread reads the signal from the wake-up socket while the pass runs.
+    The first signal sets `asked` to its number. A later Ctrl-C ends the process at once, but a later SIGTERM or SIGHUP
+    does not, because systemd sends the two together.
+
+    Python runs signal handlers only between two bytecode instructions, and a pass is one long call. A separate thread
+    therefore reads the signal from the wake-up socket while the pass runs.
     """
 
     def __init__(self, notice: Callable[[], None] = lambda: None) -> None:
@@ -138,8 +140,8 @@ class Interrupts:
         self._notice = notice
 
     def __enter__(self) -> Interrupts:
-        # Only the main thread may set signal handlers. A shell ignores Ctrl-C for background jobs, and nohup ignores
-        # SIGHUP: such signals stay ignored.
+        # Only the main thread may set signal handlers. Shells ignore Ctrl-C for background jobs, and nohup ignores
+        # SIGHUP; these signals remain ignored.
         in_main = threading.current_thread() is threading.main_thread()
         numbers = [number for number in ENDING if in_main and signal.getsignal(number) is not signal.SIG_IGN]
         self._old = {number: signal.signal(number, lambda number, frame: None) for number in numbers}
@@ -151,11 +153,11 @@ class Interrupts:
         return self
 
     def check(self) -> None:
-        """End the process by the signal that has arrived, if any; for work that has nothing to save yet."""
+        """End the process if a signal has arrived; called if there is nothing to save."""
         if self.asked:
             self.__exit__()
             signal.raise_signal(self.asked)
-            raise KeyboardInterrupt  # if the signal's handler returned
+            raise KeyboardInterrupt  # if the handler of the signal has returned
 
     def __exit__(self, *exc: object) -> None:
         if self._old:

@@ -1,8 +1,9 @@
-"""The photon maps of a picture with caustics: particles that mirrors and smooth glass cast on other surfaces.
+"""The photon maps for caustics: particles that mirrors and smooth glass cast on other surfaces.
 
-A particle leaves a lamp toward smooth surfaces, passes mirrors and glass, and is stored at the first surface that is
-neither; from there it continues once, through mirrors and glass to a second such surface. SAMPLES_PER_MAP samples of
-every pixel share a map; the radius within which a particle contributes shrinks from map to map.
+A particle leaves a lamp toward mirrors and glass, and is stored at the first surface that is neither. From there it is
+scattered once; if it hits mirrors or glass again, it is stored a second time at the next surface that is neither.
+SAMPLES_PER_MAP samples of every pixel share a map. The radius within which a particle contributes decreases from map to
+map.
 """
 
 from __future__ import annotations
@@ -20,23 +21,23 @@ from .photons import Photon, PhotonDensity, PhotonMap
 from .scene_data import SceneData
 
 SAMPLES_PER_MAP = 4
-PER_PIXEL = 2.0  # particles of a map per pixel, within the limits below
+PER_PIXEL = 2.0  # particles of a map per pixel, subject to the following limits
 MIN_PARTICLES, MAX_PARTICLES = 1 << 14, 1 << 19
-FOOTPRINT = 1.0  # radius of a search in the first map, in median widths of a pixel on the visible surfaces
+FOOTPRINT = 1.0  # radius of a search in the first map, relative to the median width of a pixel on the visible surfaces
 SHRINKING = -1 / 6  # exponent of the number of maps in the radius (Knaus2011, with alpha = 2/3)
-DENSITY_CELL = 4.0  # width, in radii, of the cubes in which particles are counted
-WAVELENGTHS = 4  # per sample in spectral variants
+DENSITY_CELL = 4.0  # width of the cubes in which particles are counted, relative to the radius
+WAVELENGTHS = 4  # number of wavelengths per sample in spectral variants
 WAVELENGTH_KEY = 0x48554553  # key of the sequence of the maps' wavelengths
 PROBED = 48  # rays per axis for measuring the width of a pixel
 
 
 @dataclass
 class _Trail:
-    """Particles from a lamp through mirrors to a surface, and from there through mirrors to a second one."""
+    """The path of a particle: from a lamp through mirrors to a first surface, then through mirrors to a second one."""
 
     flight: Flight
-    density: Float  # with respect to étendue, at the start of the current chain of mirrors
-    mirrored: Mask  # whether such a chain has begun
+    density: Float  # density with respect to étendue, at the start of the current chain of mirrors
+    mirrored: Mask  # whether a chain of mirrors has begun
     landed: Mask
     first: Photon
     landed_again: Mask
@@ -46,8 +47,8 @@ class _Trail:
 class PhotonMaps:
     """The photon maps of a render, of which only one is in memory at a time.
 
-    current  the map of the current samples
-    density  approximate number of arriving particles per unit area; computed from the first map and used for all
+    current  map of the current samples
+    density  approximate number of arriving particles per unit area, computed from the first map and used for all maps
 
     radius_factor  factor applied to the default radius of the first map
     """
@@ -64,12 +65,12 @@ class PhotonMaps:
         self._current: tuple[int, PhotonMap] | None = None
 
     def prepare(self, number: int) -> None:
-        """Make map `number` the current one."""
+        """Compute map `number`, which becomes the current map."""
         if not self._is_dense:
             trail, width = self._trace(0), DENSITY_CELL * self.radius
             self.density, self._is_dense = PhotonDensity(self.mi, trail.first, trail.landed, width, self.count), True
         if self._current is None or self._current[0] != number:
-            self._current = None  # free it before the next one is made
+            self._current = None  # free the memory before the next map is computed
             trail, radius = self._trace(number), self.radius * (number + 1) ** SHRINKING
             photons, landed = [trail.first, trail.second], [trail.landed, trail.landed_again]
             self._current = number, PhotonMap(self.mi, photons, landed, radius)
@@ -80,27 +81,28 @@ class PhotonMaps:
         return self._current[1]
 
     def path_weight(self, lobe: Float, density: Float) -> Float:
-        """MIS weight of a path that hits the lamp behind mirrors, against the particles (power heuristic).
+        """The MIS weight (power heuristic) of a path that hits a lamp through mirrors, relative to the particles.
 
-        lobe     density of its last direction before the mirrors, divided by the cosine
-        density  density of the particles with respect to étendue, at the lamp, in the medium where the path began
+        lobe     density of the last direction that the path sampled before the mirrors, divided by the cosine
+        density  density of the particles at the lamp with respect to étendue, in the medium where the path began
         """
         particles = density * (self.total * dr.pi * dr.square(self.current.radius))
         ratio = particles / lobe
         return dr.select(lobe > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)
 
     def etendue_density(self, place: Point) -> Float:
-        """Approximate density of the particles that arrive at a rough surface, with respect to étendue."""
+        """The approximate density, with respect to étendue, of the particles that arrive at a rough surface."""
         return self.density.at(place) * dr.inv_pi
 
     # ------------------------------------------------------------------ wavelengths
 
     def wavelength(self, number: UInt, turn: UInt) -> Float:
-        """The number in [0, 1) that selects the wavelengths of a map's particles and of the paths that read the map;
-        `turn` determines which of them is first.
+        """The number in [0, 1) that selects the wavelengths of the particles of a map and of the paths that use the
+        map.
 
-        The wavelengths are one number and its shifts by 1/4, 2/4, 3/4 of the range: multiples of the golden ratio
-        distribute the number evenly over a quarter, and multiples of the square root of 2 select the first wavelength.
+        The wavelengths correspond to this number and to its shifts by 1/4, 2/4 and 3/4; `turn` determines which of them
+        is the first. Multiples of the golden ratio distribute the numbers evenly over a quarter of the range, and
+        multiples of the square root of 2 select the first wavelength.
         """
         key = sampler.pixel_key(self.mi.UInt32(WAVELENGTH_KEY), self.particles.seed)
         place, first = (
@@ -136,13 +138,13 @@ class PhotonMaps:
         return float(np.median(widths)) if len(widths) else 1e-3
 
     def _trace(self, number: int) -> _Trail:
-        """The particles of map `number`, traced to their ends."""
+        """Trace the particles of map `number` to their ends."""
         mi, particles = self.mi, self.particles
         lane = dr.arange(mi.UInt32, self.count)
         begin = mi.UInt64(dr.opaque(mi.UInt64, number * self.count)) + mi.UInt64(lane)
         low, key = mi.UInt32(begin), particles.key(mi.UInt32(begin >> 32))
-        # Where wavelengths separate, each of the map's wavelengths continues alone for one part of the particles. A
-        # part is contiguous in the sequence, so that it is evenly distributed.
+        # Where wavelengths separate, a particle continues with one of the map's wavelengths, a different one for each
+        # part of the particles. A part is contiguous in the sequence of particles, so it is evenly distributed.
         turn = lane * WAVELENGTHS // dr.opaque(mi.UInt32, self.count)
         wavelength = self.wavelength(dr.opaque(mi.UInt32, number), turn) if mi.is_spectral else None
         particle, flight = particles.leave(key, low, wavelength)
@@ -155,16 +157,16 @@ class PhotonMaps:
             mode="symbolic",
             label="particles",
         )[0]
-        dr.eval(trail.landed, trail.landed_again, trail.first, trail.second)  # one kernel for all uses
+        dr.eval(trail.landed, trail.landed_again, trail.first, trail.second)  # all results are computed by one kernel
         return trail
 
     def _vertex(self, trail: _Trail, key: UInt, low: UInt, turn: UInt) -> _Trail:
-        """One vertex of a particle, where it is stored or continues."""
+        """Process one vertex of a particle, at which it is stored, continues, or ends."""
         mi, particles, flight = self.mi, self.particles, trail.flight
         vertex = particles.intersect(flight)
         flags = vertex.bsdf.flags()
         smooth, rough = mi.has_flag(flags, mi.BSDFFlags.Delta), mi.has_flag(flags, mi.BSDFFlags.Smooth)
-        # A surface with both a delta and a rough lobe stores every second particle, at twice its flux.
+        # At a surface with both a delta and a rough lobe, every second particle is stored, with twice its flux.
         both = smooth & rough & trail.mirrored
         flight.throughput *= dr.select(both, 2, 1)
         coin = self.data.pair(key, low, flight.dimension + 2)[0]
@@ -183,7 +185,7 @@ class PhotonMaps:
         first, second = stays & ~trail.landed, stays & trail.landed
         bs, weight = particles.sample_bsdf(key, low, flight, vertex)
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-        # From its first surface a particle continues once, to a second one behind mirrors.
+        # After the first surface, a particle is scattered once and continues through mirrors to a second surface.
         active = flight.active & ~second & (first ^ delta)
         flight.eta = dr.select(first, 1, flight.eta)
         following = particles.follow(key, low, flight, vertex, bs, weight, active)

@@ -1,8 +1,8 @@
-"""A photon map: particles stored where they arrive, for estimating the incident light at a point.
+"""A photon map: particles are stored where they arrive, for estimating the incident light at a point.
 
-The map is a grid of cells as wide as a search (two radii), hashed so that a row of cells along x is contiguous in
-memory: all particles within the radius of a point are in four such rows. Particles are sorted by cell and by number, so
-that sums over them do not depend on the machine or on the order of computation.
+The map is a grid of cells whose width is the diameter of a search. It is hashed so that a row of cells along x is
+contiguous in memory; all particles within the radius of a point are then in four rows. Particles are sorted by cell and
+by number, so sums over particles do not depend on the machine or on the order of computation.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from ..bridge.faults.borrowed_memory import own
 from ..bridge.types import Float, Mask, OfVariant, Point, Radiance, UInt, Vector
 from . import sampler
 
-ROW = 4096  # distinct cells along x; particles further out are assigned to the outermost
-LEVEL = 0.25  # largest distance of a particle from the tangent plane of the place, as a fraction of the radius
-FACING = 0.9  # smallest cosine between the normals: excludes particles around an edge
+ROW = 4096  # number of distinct cells along x; particles farther out are assigned to the outermost cells
+LEVEL = 0.25  # largest distance of a particle from the tangent plane at the point, as a fraction of the radius
+FACING = 0.9  # smallest cosine between the normals, which excludes particles beyond an edge
 VISITED = 16  # approximate number of particles visited per row
-CUBES = 1 << 16  # entries of a PhotonDensity
-FIELDS = 16  # numbers per particle, see `Photon.packed`
+CUBES = 1 << 16  # number of entries of a `PhotonDensity`
+FIELDS = 16  # number of values per particle, see `Photon.packed`
 
 
 @dataclass
 class Photon:
     """A stored particle.
 
-    position, normal  its position, and the geometric normal of the surface there, whichever side it arrived on
-    direction         unit vector toward where it came from, away from the surface
-    flux              its flux
-    density           `sources.Particle.density` at its lamp, divided by the square of the index there
-    depth             segments of its path
-    second            whether this is its second surface, reached from a first one
+    position, normal  position, and geometric normal of the surface, which is independent of the side of arrival
+    direction         unit vector toward the origin of the particle, away from the surface
+    flux              flux of the particle
+    density           `sources.Particle.density` at the lamp, divided by the squared index of refraction at the lamp
+    depth             number of segments of the path
+    second            whether the particle has been stored before and this is its second surface
     """
 
     position: Point
@@ -54,7 +54,7 @@ class Photon:
         return Photon(mi.Point3f(0), zero, zero, mi.Spectrum(0), mi.Float(0), mi.UInt32(0), mi.Bool(False))
 
     def packed(self) -> list[Float]:
-        """The particle as FIELDS numbers."""
+        """The particle as a list of FIELDS values."""
         mi_float = type(self.density)
         flux = list(self.flux) + [mi_float(0)] * (4 - len(self.flux))
         first = [*self.position, *self.normal, mi_float(self.depth), self.density]
@@ -62,7 +62,7 @@ class Photon:
 
     @staticmethod
     def unpacked(mi: ModuleType, record: OfVariant, like: Radiance) -> Photon:
-        """The particle of a record of `packed`, with a flux of the type of `like`."""
+        """A particle from the values of `packed`, with a flux of the same type as `like`."""
         values = [record[i // 4, i % 4] for i in range(FIELDS)]
         return Photon(
             mi.Point3f(*values[:3]),
@@ -77,11 +77,11 @@ class Photon:
 
 @dataclass
 class Search:
-    """A point whose surroundings on its surface are searched for particles.
+    """A search for particles near a point, on the surface of this point.
 
-    On surfaces that face the same way, particles are accepted whichever side they arrived on, since a rough surface may
-    transmit light; on surfaces that face the other way, as parts of one mesh may, only those that arrived on the side
-    of `back`.
+    On surfaces with a similar normal, particles from both sides are accepted, because a rough surface may transmit
+    light. On surfaces with the opposite normal, which may be parts of the same mesh, only particles that arrived on the
+    side of `back` are accepted.
 
     place, normal  the point, and the normal of its surface
     back           direction toward the viewer
@@ -94,7 +94,7 @@ class Search:
     u: Float
 
     def accepts(self, photon: Photon, radius: Float) -> Mask:
-        """Whether a particle is within the radius, close to the tangent plane of the place, and on a matching side."""
+        """Whether a particle is within the radius, close to the tangent plane at the point, and on a matching side."""
         offset = photon.position - self.place
         distance2, height = dr.squared_norm(offset), dr.dot(offset, self.normal)
         near = (distance2 < dr.square(radius)) & (abs(height) < LEVEL * radius)
@@ -104,7 +104,7 @@ class Search:
 
 
 class PhotonMap:
-    """Particles, indexed by position. `radius` is kernel data like the particles, so a new value recompiles nothing."""
+    """Particles, indexed by position. `radius` is kernel data, so changing it does not recompile kernels."""
 
     def __init__(self, mi: ModuleType, photons: Sequence[Photon], landed: Sequence[Mask], radius: float):
         self.mi = mi
@@ -122,7 +122,8 @@ class PhotonMap:
         column = np.concatenate([np.array(one) for one in columns])
         stored = np.flatnonzero(column < ROW)
         self.count = len(stored)
-        # At least twice as many rows as particles: more take longer to build and to read, fewer collide more often.
+        # At least twice as many rows as particles: with more rows, building and reading takes longer; with fewer rows,
+        # collisions are more frequent.
         bits = max(self.count.bit_length() + 1, 10)
         row = np.concatenate([np.array(one) for one in rows])[stored] & np.uint32((1 << bits) - 1)
         key = row + column[stored]
@@ -160,12 +161,12 @@ class PhotonMap:
         active: Mask,
         within: float = 0.0,
     ) -> tuple[Radiance, Radiance]:
-        """(sum of `visit(particle, weight by distance in 1/m^2, mask)` over the particles of a search, excess of this
-        sum over that of a search with the fraction `within` of the radius; 0 if `within` is 0).
+        """The sum of `visit(particle, weight, mask)` over the particles of a search, and its excess over a second sum.
 
-        The weight is a paraboloid on the disk of the radius, with integral 1. Where particles are dense, only every
-        second, third, ... particle of a row is visited, beginning with one that the search's random number selects, and
-        its weight is multiplied accordingly.
+        The weight depends on the distance, in 1/m^2: it is a paraboloid over the disk of the search, with integral 1.
+        Where particles are dense, only every second, third, ... particle of a row is visited, starting with one
+        selected by the random number of the search, and its weight is multiplied accordingly. The second sum is that of
+        a search with the fraction `within` of the radius; the excess is 0 if `within` is 0.
         """
         mi, radius2 = self.mi, dr.square(self.radius)
         rows = self._rows(search)
@@ -201,8 +202,10 @@ class PhotonMap:
         return result[-2], result[-1]
 
     def _rows(self, search: Search) -> Callable[[UInt, Mask], tuple[UInt, UInt, UInt, UInt, UInt]]:
-        """A function of a row's number, 0 to 3, that returns (cell in y, cell in z, first particle, end of the row,
-        stride). If the search covers fewer than four rows, the others are empty."""
+        """A function that maps the number of a row, 0 to 3, to cell in y, cell in z, first particle, end and stride.
+
+        If the search covers fewer than four rows, the remaining rows are empty.
+        """
         mi = self.mi
         low = [mi.Int32(dr.floor((x - self.radius) * self.per_cell)) for x in search.place]
         high = [mi.Int32(dr.floor((x + self.radius) * self.per_cell)) for x in search.place]
@@ -224,17 +227,16 @@ class PhotonMap:
 def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
     """The indices that sort keys stably.
 
-    The keys are sorted by 16 bits at a time, which NumPy does by counting: sorting by 32 bits takes twice as long.
+    The keys are sorted by 16 bits at a time, for which NumPy uses radix sort; sorting by 32 bits takes twice as long.
     """
     order = np.argsort(key.astype(np.uint16), kind="stable")
     return order[np.argsort((key[order] >> 16).astype(np.uint16), kind="stable")]
 
 
 class PhotonDensity:
-    """The approximate number of arriving particles per unit area: one number per cube of space, computed once from one
-    map.
+    """The approximate number of arriving particles per unit area, computed once from one map, per cube of space.
 
-    It only determines weights, which are correct for any number as long as all estimators use the same one.
+    The density only determines MIS weights, which are valid for any density as long as all estimators use the same one.
     """
 
     def __init__(self, mi: ModuleType, photon: Photon, landed: Mask, width: float, traced: int):
@@ -247,12 +249,12 @@ class PhotonDensity:
 
     @staticmethod
     def nowhere(mi: ModuleType) -> PhotonDensity:
-        """The density before the first map exists, 0 everywhere, with the same kernel as any other."""
+        """The density before the first map exists: 0 everywhere. It uses the same kernel as other densities."""
         photon = Photon.none(mi)
         return PhotonDensity(mi, photon, mi.Bool(False), 1.0, 1)
 
     def at(self, place: Point) -> Float:
-        """Density at a place, 1/m^2, per traced particle."""
+        """The density at a point, 1/m^2, per traced particle."""
         return dr.gather(self.mi.Float, self.values, self._place(place))
 
     def _place(self, point: Point) -> UInt:

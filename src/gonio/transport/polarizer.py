@@ -1,4 +1,4 @@
-"""A scene seen through a polarizer: Mitsuba's path tracer with Mueller matrices, and the filter's transmission."""
+"""Render a scene as seen through a polarizer: Mitsuba's path tracer with Mueller matrices, and the polarizer."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from ..errors import InputError
 from .integrators import Settings
 from .mitsuba_render import MitsubaRender
 
-# A vertex multiplies two matrices of 4 x 4 spectra: samples in flight take sixteen times as much memory
+# samples per pass; at a vertex, two matrices of 4 x 4 spectra are multiplied, so a sample takes 16 times as much memory
 WAVEFRONT = 1 << 19
 
 TRACED = ("path", "direct")  # the integrators that Mitsuba's path tracer can replace
 
 
 class PolarizedRender(MitsubaRender):
-    """A picture of the light that passes a linear polarizer.
+    """A render of the light that passes through a linear polarizer.
 
-    It accumulates the Stokes vector of each pixel, with Q > 0 along the picture's horizontal and U > 0 at 45 degrees
-    toward its vertical. A filter at angle theta transmits (I + Q cos 2 theta + U sin 2 theta) / 2 (Born1999).
+    It accumulates the Stokes vector of each pixel, where Q > 0 means horizontal polarization in the picture, and U > 0
+    polarization at 45 degrees. A polarizer at the angle theta transmits (I + Q cos 2 theta + U sin 2 theta) / 2
+    (Born1999).
 
-    degrees  the direction of transmitted polarization, counterclockwise from the picture's horizontal
+    degrees  direction of the transmitted polarization, counterclockwise from the horizontal of the picture
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, spp: int, settings: Settings, degrees: float) -> None:
@@ -47,7 +48,7 @@ class PolarizedRender(MitsubaRender):
 
     @property
     def stokes(self) -> NDArray[np.float64]:
-        """I, Q, U and V of each pixel, (height, width, 4, 3), linear RGB."""
+        """The Stokes parameters I, Q, U and V of each pixel in linear RGB, (height, width, 4, 3)."""
         assert self._sum is not None, "advance() comes first"
         mean = self._sum / self.done
         return mean[..., 3:15].reshape(*mean.shape[:2], 4, 3)  # after the channels of the picture
@@ -63,7 +64,7 @@ class PolarizedRender(MitsubaRender):
 
 
 def check(settings: Settings, location: str) -> None:
-    """Raise InputError, which names `location`, for a picture that cannot be combined with a polarizer."""
+    """Raise InputError, which names `location`, if the settings cannot be combined with a polarizer."""
     if settings.integrator not in TRACED:
         what = f"the scene has a polarizer, but '{settings.integrator}' does not trace polarized light"
         raise InputError(what, location, "use " + " or ".join(TRACED))

@@ -1,20 +1,20 @@
-"""Sample points: positions on the pixel and on the light, and directions of lobes.
+"""Samplers: random numbers for positions on pixels and lamps, and for directions.
 
-A sampler here is a pure function of *(key, index, dimension)*: `key` identifies the pixel and the seed, `index` counts
-the samples of that pixel, `dimension` identifies the decision that uses the numbers. There is no state, so a picture
-can be divided into passes of any size, resumed, or distributed over machines, and is bit-identical.
+A sampler is a pure function of *(key, index, dimension)*: `key` identifies the pixel and the seed, `index` counts the
+samples of this pixel, and `dimension` identifies the decision for which the numbers are used. Samplers have no state,
+so a picture is bit-identical if it is divided into passes of any size, resumed, or distributed over several machines.
 
     >>> key = pixel_key(pixel, seed)
     >>> u = PAIRS["sobol"](key, index, dimension)    # two floats in [0, 1)
 
-The indices of one (key, dimension) form a sequence: for Sobol points every aligned block of 2^m indices is a
-(0, m, 2)-net in base 2 -- each dyadic rectangle of area 2^-m holds exactly one point -- and because blocks nest, any
-*first n* samples are as even as n allows. Different dimensions are padded (Burley2020): each has its own shuffle of
-the indices, so that decisions are independent of each other while each is stratified.
+The indices of one (key, dimension) form a sequence. For Sobol points, every aligned block of 2^m indices is a
+(0, m, 2)-net in base 2: each dyadic rectangle of area 2^-m contains exactly one point. Because blocks are nested, the
+first n samples are well distributed for any n. Dimensions are padded (Burley2020): the indices are shuffled separately
+for each dimension, so decisions are independent of each other, and each is stratified.
 
-Nets suit integrands with edges: a pixel, a lamp. Functions of direction are periodic, and mostly smooth: there a
-randomly shifted lattice has a much smaller error (Sloan1994), by a factor of 3 to 100 for smooth functions at 16 to 64
-points, at half the cost. `default` uses each where it is better.
+Nets are suited to integrands with discontinuities, such as those over a pixel or a lamp. Functions of direction are
+periodic and mostly smooth. For smooth functions and 16 to 64 points, a randomly shifted lattice reduces the error by a
+factor of 3 to 100 (Sloan1994), at half the cost. The sampler `default` uses each where it is better.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import drjit as dr
 from ..bridge.types import Float, UInt
 
 Pair: TypeAlias = tuple[Float, Float]
-PairFunction: TypeAlias = Callable[[UInt, UInt, UInt], Pair]  # of (key, index, dimension)
+PairFunction: TypeAlias = Callable[[UInt, UInt, UInt], Pair]  # a function of (key, index, dimension)
 
 SAMPLERS: dict[str, str] = {
     "sobol": "Owen-scrambled Sobol pairs, shuffled per pixel and dimension; any number of samples",
@@ -48,16 +48,16 @@ def mix(a: UInt, b: UInt) -> UInt:
 
 
 def pixel_key(pixel: UInt, seed: UInt) -> UInt:
-    """The key of a pixel and a seed: 32 bits, decorrelated between pixels and between seeds."""
+    """The 32-bit key of a pixel and a seed; keys of different pixels and seeds are uncorrelated."""
     return mix(mix(pixel, seed), seed ^ 0xA511E9B3)
 
 
 def owen_hash(x: UInt, seed: UInt) -> UInt:
-    """Owen scrambling of a *bit-reversed* word: bit i is flipped by a hash of the bits below it and the seed.
+    """Owen scrambling of a *bit-reversed* word: bit i is flipped by a hash of the lower bits and the seed.
 
-    The Laine-Karras construction: additions and multiplications by odd numbers carry only upwards, so that on
-    reversed words each digit depends on more significant digits alone, as nested uniform scrambling requires. The
-    constants are N. Vegdahl's, as in pbrt-v4's FastOwenScrambler.
+    This is the Laine-Karras construction. In additions and multiplications by odd numbers, carries propagate only
+    upward. In reversed words, each digit therefore depends only on more significant digits, as nested uniform
+    scrambling requires. The constants are N. Vegdahl's, as in pbrt-v4's FastOwenScrambler.
     """
     x = x ^ (x * 0x3D20ADEA)  # never `^=`, which would modify the caller's Dr.Jit array
     x = (x + seed) * ((seed >> 16) | 1)
@@ -66,10 +66,10 @@ def owen_hash(x: UInt, seed: UInt) -> UInt:
 
 
 def pascal(x: UInt) -> UInt:
-    """The second Sobol dimension before bit reversal: x times the Pascal matrix mod 2.
+    """The second Sobol dimension before bit reversal: the Pascal matrix times x, modulo 2.
 
-    That matrix is the fifth Kronecker power of [[1, 1], [0, 1]], so five masked shifts apply it to 32 bits
-    (Ahmed2024) where the usual direction numbers need up to 32 steps.
+    This matrix is the fifth Kronecker power of [[1, 1], [0, 1]], so five masked shifts multiply it with 32 bits
+    (Ahmed2024). The usual direction numbers would require up to 32 steps.
     """
     x = x ^ ((x & 0xAAAAAAAA) >> 1)
     x = x ^ ((x & 0xCCCCCCCC) >> 2)
@@ -79,7 +79,10 @@ def pascal(x: UInt) -> UInt:
 
 
 def unit(x: UInt) -> Float:
-    """A 32-bit word as a float in [0, 1): its upper 24 bits, which a float32 holds exactly, so 1 is never reached."""
+    """Convert a 32-bit word to a float in [0, 1).
+
+    Only the upper 24 bits are used, which float32 represents exactly, so the result is always less than 1.
+    """
     return dr.float32_array_t(x)(x >> 8) * 2.0**-24
 
 
@@ -93,21 +96,21 @@ def sobol_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
 
 
 def independent_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
-    """Two independent numbers: two hashes of a counter, of the same quality as a stateful generator."""
+    """Two independent numbers, which are hashes of a counter and as good as those of a stateful generator."""
     word = mix(mix(key, type(key)(dimension)), type(key)(index))
     return unit(mix(word, type(key)(0x51633E2D))), unit(mix(word, type(key)(0x68BC21EB)))
 
 
-# Slope y / x of the lattice: the first 32-bit word for which the shortest dual vector of the lattices of 2, 4, ... 2^20
-# points is at least 0.66 times that of a hexagonal lattice (found bit by bit, keeping the 400 best candidates). The
-# ratio is 0.74 for 16 points and 0.89 for 64.
+# The slope y / x of the lattice: the first 32-bit word for which the shortest dual vector of the lattices of 2, 4, ...
+# 2^20 points is at least 0.66 times as long as that of a hexagonal lattice. It was found by a search bit by bit that
+# kept the 400 best candidates. The ratio is 0.74 for 16 points and 0.89 for 64.
 SLOPE = 1030637
 
 
 def lattice_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
-    """Point `index` of a rank-1 lattice, extensible in base 2 (Hickernell2000), randomly shifted and shuffled.
+    """Point `index` of a rank-1 lattice sequence in base 2 (Hickernell2000), randomly shifted and shuffled.
 
-    Every aligned block of 2^m indices is a lattice of 2^m points, translated.
+    Every aligned block of 2^m indices is a translated lattice of 2^m points.
     """
     seed = mix(key, type(key)(dimension))
     x = owen_hash(dr.brev(type(key)(index)), seed)
@@ -121,5 +124,5 @@ PAIRS: dict[str, PairFunction] = {
     "independent": independent_pair,
 }
 
-#: The samplers of `sampler="default"`: for positions (on a pixel, on a lamp), and for directions.
+#: The samplers that `sampler="default"` uses for positions on pixels and lamps, and for directions.
 DEFAULT = ("sobol", "lattice")

@@ -1,4 +1,4 @@
-"""Evaluation and sampling of BSDFs at a vertex."""
+"""Evaluate and sample BSDFs at a vertex."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .media import Crossing, Media
 
 @dataclass
 class Vertex:
-    """A point where a path has hit a surface.
+    """A point at which a path has hit a surface.
 
-    crossing  the media on the two sides of the surface; None in scenes without media
+    crossing  media on the two sides of the surface; None in scenes without media
     """
 
     si: SurfaceInteraction
@@ -24,13 +24,13 @@ class Vertex:
     crossing: Crossing | None = None
 
     def side(self, direction: Vector) -> UInt:
-        """The media on the side of a local direction."""
+        """The media on the side of the surface to which a local direction points."""
         assert self.crossing is not None
         return dr.select(self.si.wi.z * direction.z < 0.0, self.crossing.beyond, self.crossing.here)
 
 
 class Scattering:
-    """BSDFs in a context that tells Gonio's plugins how the integrator treats media and wavelengths."""
+    """Evaluates BSDFs in a context that specifies how the integrator treats media and wavelengths."""
 
     def __init__(self, mi: ModuleType, media: Media) -> None:
         self.mi = mi
@@ -38,23 +38,23 @@ class Scattering:
         self.context.type_mask = NESTS if media.known else SEPARATES
 
     def eval(self, vertex: Vertex, toward: Vector, active: Mask) -> Radiance:
-        """The BSDF times the cosine, toward a light in the local direction `toward`."""
+        """The BSDF times the cosine for a light in the local direction `toward`."""
         return vertex.bsdf.eval(self.context, vertex.si, toward, active)
 
     def sample(self, vertex: Vertex, lobe: Float, u: Point, active: Mask) -> tuple[BSDFSample, Radiance]:
-        """A sampled direction, and its weight: the BSDF times the cosine, divided by the density."""
+        """Sample a direction. Also returns its weight, the BSDF times the cosine divided by the density."""
         return vertex.bsdf.sample(self.context, vertex.si, lobe, u, active)
 
     def eval_pdf_sample(
         self, vertex: Vertex, toward: Vector, lobe: Float, u: Point, active: Mask
     ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
-        """Value and density toward a light, and a sample, in one call from the kernel."""
+        """The value and density toward a light, a BSDF sample, and its weight, in one call from the kernel."""
         return vertex.bsdf.eval_pdf_sample(self.context, vertex.si, toward, lobe, u, active)
 
     def pass_through(
         self, vertex: Vertex, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> tuple[BSDFSample, Radiance]:
-        """The sample, replaced by one that passes straight through where the media do not form a real surface."""
+        """The sample, replaced by one that passes straight through if the media form no real surface here."""
         if vertex.crossing is None:
             return bs, weight
         mi, through = self.mi, active & ~vertex.crossing.surface
@@ -65,10 +65,10 @@ class Scattering:
 
 
 def keep_hero(mi: ModuleType, throughput: Radiance, hero_only: UInt, here: Mask) -> tuple[Radiance, UInt]:
-    """Continue with the first wavelength only where the index depends on it, weighted for all of them.
+    """Continue with only the first wavelength, weighted for all wavelengths, if the index of refraction depends on it.
 
-    The wavelengths of a sample are shifted copies of one number, so the first has the same distribution as the others
-    and can represent all of them (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero wavelength).
+    The wavelengths of a sample are shifted copies of one number, so the first wavelength has the same distribution as
+    the others and can represent all of them (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero wavelength).
     """
     count = dr.size_v(throughput)
     hero = mi.Spectrum(0)

@@ -1,4 +1,4 @@
-"""The scene data of a render's kernels: one object, made once and passed to the integrator."""
+"""The scene data for the kernels of a render, in one object that is passed to the integrator."""
 
 from __future__ import annotations
 
@@ -32,26 +32,26 @@ from .media import Media
 from .scattering import Scattering, Vertex
 from .surfaces import Surfaces
 
-# The integral of the CIE 1931 luminosity curve as Mitsuba tabulates it (nm); dividing by it gives white of radiance 1
-# a luminance of Y = 1.
+# The integral of the CIE 1931 luminosity curve, as tabulated by Mitsuba (nm). Dividing by it gives a white of radiance
+# 1 the luminance Y = 1.
 CIE_Y_INTEGRAL = 106.7502593994140625
 
 
 class SceneData:
-    """The parts of a scene that integrators use; lights and media are prepared on first use.
+    """The parts of a scene that integrators use. Lights and media are prepared on first use.
 
-    pair, direction_pair  the sampler's points: two numbers in [0, 1) for (key, index, dimension), for positions on
-                          pixels and lamps, and for directions
-    camera      rays through pixels
-    surfaces    the surfaces that rays hit
+    pair, direction_pair  functions of the sampler that return two numbers in [0, 1) for (key, index, dimension): `pair`
+                          for positions on pixels and lamps, `direction_pair` for directions
+    camera      generates rays through pixels
+    surfaces    intersects rays with surfaces
     media       absorption between surfaces
     lights      the light sources
-    scattering  evaluation and sampling of BSDFs
-    aovs        whether albedo and normal of the first hit are needed for the denoiser
+    scattering  evaluates and samples BSDFs
+    aovs        whether the albedo and the normal of the first hit are needed for the denoiser
 
-    sampler_name      a name of `sampler.SAMPLERS`, or "default"
-    ambient_color     scene-wide ambient radiance; None or 0 for none
-    mis_compensation  whether BSDFs are sampled too; BSDF sampling then covers the uniform part of an environment map
+    sampler_name      a name in `sampler.SAMPLERS`, or "default"
+    ambient_color     ambient radiance of the scene; None or 0 for no ambient light
+    mis_compensation  whether BSDFs are sampled too, so that the density of an environment map can omit its uniform part
     """
 
     def __init__(
@@ -85,31 +85,31 @@ class SceneData:
 
     @cached_property
     def ambient(self) -> Texture | None:
-        """The ambient light as a texture of radiance; None if no BSDF has an attribute "ambient" to reflect it."""
+        """The ambient radiance as a texture; None if no BSDF has the attribute "ambient", its ambient reflectance."""
         color = self._ambient_color
         if color is None or not any(color):
             return None
         if not any(dr.any(shape.bsdf().has_attribute("ambient")) for shape in self.scene.shapes()):
             return None
-        # An rgb texture is a reflectance, clamped to 1; d65 times such a texture is a light, also in spectral variants.
+        # An rgb texture is a reflectance, clamped to 1. Multiplied by d65, it is a radiance, also in spectral variants.
         scale = max(color)
         tint = {"type": "rgb", "value": [c / scale for c in color]}
         return self.mi.load_dict({"type": "d65", "color": tint, "scale": scale})
 
     @cached_property
     def smooth(self) -> list[Shape]:
-        """The shapes that are mirrors or smooth glass, at least in part."""
+        """The shapes that have a delta lobe, such as mirrors and smooth glass."""
         mi = self.mi
         return [shape for shape in self.scene.shapes() if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta)]
 
     @cached_property
     def disperses(self) -> bool:
-        """Whether an index of refraction depends on the wavelength."""
+        """Whether the index of refraction of a material depends on the wavelength."""
         return any(shape.bsdf().flags() & DISPERSES for shape in self.scene.shapes())
 
     @cached_property
     def media_at_camera(self) -> UInt:
-        """The media in which camera rays begin, as `Media` counts them."""
+        """The media in which camera rays begin, in the encoding of `Media`."""
         mi = self.mi
         if not self.media.known:
             return mi.UInt32(0)
@@ -120,13 +120,13 @@ class SceneData:
     def first_hit(
         self, pixel: UInt, key: UInt, index: UInt, active: Mask = True, wavelength: Float | None = None
     ) -> tuple[Ray, Radiance, Hit]:
-        """A sample's camera ray, its weight, and its first hit."""
+        """The camera ray of a sample, its weight, and its first hit."""
         ray, weight = self.camera.ray(pixel, key, index, wavelength)
         ray = self.mi.Ray3f(ray)
         return ray, weight, self.surfaces.nearest(ray, active)
 
     def begins_path(self, hit: Hit) -> Mask:
-        """Whether a camera ray that ends at `hit` begins a path; all do, except in `foreground.py`."""
+        """Whether a camera ray that ends at `hit` begins a path. This is always true except in `foreground.py`."""
         return self.mi.Bool(True)
 
     def vertex(self, hit: Hit, ray: Ray, inside: UInt, throughput: Radiance, active: Mask) -> tuple[Vertex, Radiance]:
@@ -137,7 +137,7 @@ class SceneData:
             here = active & si.is_valid()
             throughput = dr.select(here, throughput * self.media.transmitted(inside, si, si.t), throughput)
             vertex.crossing = self.media.crossing(si, vertex.bsdf, inside, here)
-            # passes the index outside to `bridge.adapter.plugin`, which has no other access to the media
+            # passes the index of refraction outside to `bridge.adapter.plugin`, which has no other access to the media
             si.duv_dx = self.mi.Vector2f(vertex.crossing.outer - 1.0, 0.0)
         return vertex, throughput
 
@@ -146,11 +146,11 @@ class SceneData:
         return active & ~self.surfaces.blocked(shadow_ray_to(self.surfaces.offsets, si, point), active)
 
     def features(self, throughput: Radiance, si: SurfaceInteraction, alive: Mask, active: Mask) -> list[Float]:
-        """Features of a sample's first vertex, averaged in addition to its color: albedo and normal if needed.
+        """The features at the first vertex of a sample, which are averaged like its color: albedo and normal if needed.
 
-        throughput  throughput of the ray that the BSDF has sampled there
+        throughput  throughput of the ray that the BSDF has sampled at the vertex
         alive       lanes with a path
-        active      lanes whose path has hit a surface there
+        active      lanes whose path has hit a surface at the vertex
         """
         if not self.aovs:
             return []
@@ -158,7 +158,7 @@ class SceneData:
         return [dr.select(active, value, 0) for value in values]
 
     def rgb(self, radiance: Radiance, wavelengths: Sequence[Float]) -> Color:
-        """Radiance at a sample's wavelengths as linear RGB."""
+        """Convert radiance at the wavelengths of a sample to linear RGB."""
         mi = self.mi
         if mi.is_spectral:
             responses = [mi.cie1931_xyz(wavelength) * r for wavelength, r in zip(wavelengths, radiance, strict=True)]

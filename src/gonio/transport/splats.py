@@ -1,4 +1,4 @@
-"""The camera for particles: connections from points of the scene to pixels, and the light that they add there."""
+"""The camera for particle tracing: connects points of the scene to pixels, and adds their light to these pixels."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from .particles import FIRST_VERTEX, LENS, VERTEX_DIMENSIONS, Particles
 from .scene_data import SceneData
 from .sums import Sums
 
-CAMERAS = ("PerspectiveCamera", "ThinLensCamera")  # Mitsuba's cameras that points of the scene can be connected to
+CAMERAS = ("PerspectiveCamera", "ThinLensCamera")  # Mitsuba's cameras to which points of the scene can be connected
 
-# A splat is counted in units of 2^-32 of the largest radiance of a lamp. No picture is brighter on average, so 2^30
-# samples fit into a 64-bit integer; random rounding makes the sum unbiased.
+# The unit of splats is 2^-32 of the largest radiance of a lamp. No picture is brighter on average, so 2^30 samples fit
+# into a 64-bit integer; random rounding makes the sum unbiased.
 BITS = 32
-PROBED = 4096  # points on the lamps at which that radiance is estimated
-MAX_BITS = 58  # bits of one splat; a larger one is skipped and counted as invalid
+PROBED = 4096  # number of points on the lamps at which this radiance is estimated
+MAX_BITS = 58  # number of bits of a splat; a larger splat is skipped and counted as invalid
 DITHER = 0xD1B54A32
-NEAREST = 1e-2  # distance from a point light at which its brightness is bounded, as a fraction of the scene's size
+NEAREST = 1e-2  # smallest distance from a point light, relative to the scene's size, which bounds its brightness
 AT_LAMP = FIRST_VERTEX - VERTEX_DIMENSIONS  # dimension of the connection from the lamp itself
 
 
 class Splat(NamedTuple):
-    """Light that reaches the camera from a point of the scene.
+    """The light that reaches the camera from a point of the scene.
 
     uv     position on the film, pixels
     value  radiance
-    si     the point that it comes from
-    eye    the point that must be visible from `si`; None for a point at infinity, in the direction `away`
+    si     the point from which the light comes
+    eye    the point that must be visible from `si`; None for a point at infinity in the direction `away`
     """
 
     uv: Point
@@ -45,9 +45,9 @@ class Splat(NamedTuple):
 
 
 class SplatCamera:
-    """The camera of a picture made of splats.
+    """The camera of a picture that consists of splats.
 
-    unit  radiance of an increment of 1: splats are added up as integers
+    unit  radiance that corresponds to an increment of 1, because splats are added as integers
     """
 
     def __init__(self, data: SceneData, particles: Particles) -> None:
@@ -65,7 +65,7 @@ class SplatCamera:
 
     @staticmethod
     def check(data: SceneData, location: str) -> None:
-        """Raise InputError, naming `location`, if particle tracing cannot render the requested picture."""
+        """Raise InputError, which names `location`, if particle tracing cannot render the requested picture."""
         sensor = data.sensor
         if data.aovs:
             hint = "leave out --denoise, or use path"
@@ -80,7 +80,7 @@ class SplatCamera:
             raise InputError(what, location, "leave it out, or use path")
 
     def _brightest(self) -> float:
-        """A power of two above the largest radiance among probed points of the lamps."""
+        """A power of two that exceeds the radiance at all sampled points of the lamps."""
         mi, sources = self.mi, self.particles.sources
         low = dr.arange(mi.UInt32, PROBED)
         particle, _ = self.particles.leave(self.particles.key(mi.UInt32(0)), low)
@@ -93,7 +93,10 @@ class SplatCamera:
         return float(2.0 ** np.ceil(np.log2(largest))) if largest > 0 else 1.0
 
     def see_lamp(self, key: UInt, low: UInt, particle: Particle, sums: Sums) -> UInt:
-        """Splat the lamp itself, from the point where a particle leaves it; returns what `splat` returns."""
+        """Add the light that the lamp sends directly to the camera from the point where a particle leaves it.
+
+        Returns the result of `splat`.
+        """
         mi = self.mi
         invalid = mi.UInt32(0)
         if SURFACE in self.particles.sources.known:
@@ -115,14 +118,14 @@ class SplatCamera:
     def sample_direction(
         self, key: UInt, low: UInt, dimension: UInt | int, si: SurfaceInteraction, active: Mask
     ) -> tuple[Record, Radiance]:
-        """The direction sample from a point to the camera, and its importance."""
+        """A direction sample from a point to the camera, and its importance."""
         lens = self.mi.Point2f(0.5)
         if self.sensor.needs_aperture_sample():
             lens = self.mi.Point2f(*self.data.pair(key, low, dimension + LENS))
         return camera_sample(self.sensor, si, lens, active)
 
     def splat(self, key: UInt, low: UInt, sums: Sums, light: Splat, active: Mask) -> UInt:
-        """Add light to its pixel; returns 1 where its value is not finite or too large, else 0."""
+        """Add light to its pixel. Returns 1 if its value is not finite or too large, otherwise 0."""
         mi, si, eye = self.mi, light.si, light.eye
         x, y = mi.Int32(dr.floor(light.uv.x)), mi.Int32(dr.floor(light.uv.y))
         active = active & (x >= 0) & (y >= 0) & (x < mi.Int32(self.width)) & (y < mi.Int32(self.height))

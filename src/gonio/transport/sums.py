@@ -1,4 +1,4 @@
-"""The film: sums of samples per pixel, which `Render.image` develops into a picture."""
+"""The film: the accumulated samples of each pixel, from which `Render.image` computes the picture."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from ..bridge.types import Float, Mask, UInt, Whole
 
 @dataclass
 class Sums:
-    """Sums in 64 bits, one entry per lane: radiance (r, g, b, and other values of a complete sample), and features of
-    the first hits.
+    """Accumulated samples in double precision, with one entry per lane.
+
+    The sums are those of the radiance (r, g, b, and further values of a complete sample) and of the features at the
+    first hits. A value that is not finite, due to overflow in a BSDF, is skipped and counted, so the other samples of
+    the pixel remain valid.
 
     splats  red, green and blue of particles as integers, one entry per pixel; empty for integrators without splats
-
-    A value that is not finite (overflow in a BSDF) is skipped and counted, so that the rest of the pixel remains valid.
     """
 
     radiance: list[Float]
@@ -32,20 +33,20 @@ class Sums:
 
     @staticmethod
     def zeros(mi: ModuleType, lanes: int, radiance: int, features: int, pixels: int = 0) -> Sums:
-        """Zero sums of these sizes; `pixels` is 0 for pictures without splats."""
+        """Empty sums of the given sizes; `pixels` is 0 for pictures without splats."""
         totals, more = ([dr.zeros(mi.Float64, lanes) for _ in range(count)] for count in (radiance, features))
         splats = [dr.zeros(mi.Int64, pixels) for _ in range(3 if pixels else 0)]
         sums = Sums(totals, more, dr.zeros(mi.UInt32, lanes), splats)
-        dr.make_opaque(sums)  # as kernel data: literal zeros would give the first pass a different kernel
+        dr.make_opaque(sums)  # as kernel data, because literal zeros would cause a different kernel for the first pass
         return sums
 
     def at(self, lane: UInt) -> Sums:
-        """The sums of the lanes with these numbers."""
+        """The sums of the lanes with the given numbers."""
         totals, more = ([dr.gather(type(s), s, lane) for s in sums] for sums in (self.radiance, self.features))
         return Sums(totals, more, dr.gather(type(self.invalid), self.invalid, lane), self.splats)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Each sum by its name: views on the CPU, except for splats, which are copied since they change in place."""
+        """The sums by name: views on the CPU, except splats, which are copied because they change in place."""
         totals = {f"radiance{i}": np.asarray(values) for i, values in enumerate(self.radiance)}
         totals |= {f"feature{i}": np.asarray(values) for i, values in enumerate(self.features)}
         totals |= {f"splat{i}": np.array(values) for i, values in enumerate(self.splats)}
@@ -53,7 +54,7 @@ class Sums:
 
     @staticmethod
     def of_arrays(mi: ModuleType, arrays: Mapping[str, NDArray[Any]], lanes: int, like: Sums) -> Sums:
-        """Sums from the result of `arrays`. Raises ValueError if their number or size does not match."""
+        """Sums from the result of `arrays`. Raises ValueError if the number or size of the arrays does not match."""
         known = like.arrays()
         for name, values in known.items():
             entries = len(values) if name.startswith("splat") else lanes
@@ -70,14 +71,14 @@ class Sums:
         return totals
 
     def add(self, radiance: Sequence[Float], ended: Mask, features: Sequence[Float], begun: Mask) -> Sums:
-        """These sums plus the radiance of samples that have ended, and the features of those that have begun."""
+        """Add the radiance of samples that have ended, and the features of samples that have begun."""
         totals, lost = self._add(self.radiance, radiance, ended)
         more, lost_too = self._add(self.features, features, begun)
         lost = lost if lost_too is None else lost | lost_too
         return Sums(totals, more, self.invalid + dr.select(lost, type(self.invalid)(1), 0), self.splats)
 
     def _add(self, sums: list[Float], values: Sequence[Float], active: Mask) -> tuple[list[Float], Mask]:
-        """(sums, lanes with values that are not finite); the latter is None if there are no sums."""
+        """The sums, and a mask of the lanes with values that are not finite; the mask is None if there are no sums."""
         if not sums:
             return sums, None
         finite = dr.isfinite(sum(values))

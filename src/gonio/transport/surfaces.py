@@ -1,4 +1,4 @@
-"""Intersections of rays with surfaces."""
+"""Intersect rays with surfaces."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .placement import placement_reader
 
 
 class Surfaces:
-    """The surfaces of a scene at construction time.
+    """The surfaces that a scene has when this object is constructed.
 
-    inline      traces rays in the kernel, for scenes of a few simple shapes; otherwise Mitsuba does
-    placements  computes the surfaces of many shapes, or of those that are traced inline; the others are called
-    offsets     how far off the surfaces rays begin and end
+    inline      intersects rays in the kernel, for scenes with few simple shapes; None if Mitsuba intersects rays
+    placements  computes the surface interactions of many shapes, or of those that are intersected inline, without calls
+    offsets     distances from surfaces at which rays begin and end
     """
 
     def __init__(self, mi: ModuleType, scene: Scene) -> None:
@@ -31,20 +31,20 @@ class Surfaces:
     def nearest(self, ray: Ray, active: Mask = True) -> Hit:
         """The first surface that a ray hits.
 
-        Where a ray hits two surfaces at the same distance, the result with `coherent=True` depends on the other rays of
-        a packet, which are traced together in a common order. Which paths begin together depends on where a pass ends,
-        so the picture would depend on timing. Tracing rays one by one costs about as much.
+        Rays are traced one by one, which takes about as long as tracing packets with `coherent=True`. If a ray in a
+        packet hits two surfaces at the same distance, the result depends on the other rays of the packet. The rays of a
+        packet depend on where a pass ends, so the picture would depend on timing.
         """
         if self.inline is not None:
             return self.inline.nearest(ray, active)
         return self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
 
     def blocked(self, ray: Ray, active: Mask = True) -> Mask:
-        """Whether a ray hits anything."""
+        """Whether a ray hits any surface."""
         return self.scene.ray_test(ray, active) if self.inline is None else self.inline.blocked(ray, active)
 
     def interaction(self, hit: Hit, ray: Ray, active: Mask = True) -> SurfaceInteraction:
-        """Mitsuba's record of the surface that was hit."""
+        """Mitsuba's surface interaction for a hit."""
         if self.placements is not None:
             return self.placements.interaction(hit, ray, active)
         return hit.compute_surface_interaction(ray, self.mi.RayFlags.All, active)

@@ -1,16 +1,18 @@
-"""Render until the error is small enough.
+"""Render until the estimated error is small enough.
 
-The samples form two halves, each a picture from a separate random sequence. Their difference is noise only, however
-even the points within each half are: a quarter of their squared difference estimates the variance of their mean without
-bias. The estimate for one pixel is uncertain, but the mean over thousands gives the error of the picture.
+The samples are divided into two halves, each of which gives a picture from a separate random sequence. The two pictures
+differ only by noise, even if the points within each half are stratified. A quarter of the squared difference is an
+unbiased estimate of the variance of their mean. The estimate for a single pixel is uncertain, but its mean over
+thousands of pixels gives the error of the picture.
 
-If noise is uneven, the first samples determine how many of the later ones each tile of 4 x 4 pixels gets. This
-distribution then stays fixed, and the first samples are averaged with the rest by a weight that is the same for all
-pixels: a pixel whose number of samples depended on its own values would be biased.
+If the noise varies over the picture, the first samples determine how many of the later samples each tile of 4 x 4
+pixels gets. This distribution then remains fixed, and the first samples are averaged with the others by a weight that
+is the same for all pixels. If the number of samples of a pixel depended on its own values, the pixel would be biased.
 
-The blur of an integrator (`caustics`) is an additional error, equal in both halves. Each half also measures the
-difference from a less blurred picture; the product of two such measurements estimates its square without bias, and the
-blur's error follows from this. If blur is too large a part of the error, rendering starts over with a smaller radius.
+The blur of an integrator (`caustics`) is an additional error, which is the same in both halves. Each half also measures
+the difference from a less blurred picture. The product of two such measurements is an unbiased estimate of the squared
+difference, from which the error due to blur is computed. If the blur causes too large a part of the error, rendering
+starts again with a smaller radius.
 """
 
 from __future__ import annotations
@@ -30,43 +32,46 @@ from .integrators.progressive import SHARE, TILE, tiles
 Picture = NDArray[np.float32]
 Share = NDArray[np.uint32]
 
-FIRST = 16  # samples per pixel of both halves together, before the first estimate of the error
-FLOOR = 0.01  # relMSE = mean((x - r)^2 / (r^2 + FLOOR mean(r)^2)): noise counts relative to the scene's brightness
-MARGIN = 0.5  # standard errors added to the estimate, since rendering stops at the first of several that is low enough
-# The error falls as the number of samples to the power -1 to -1.5; with the larger exponent, no estimate comes much too
-# late.
+FIRST = 16  # samples per pixel of both halves together before the first estimate of the error
+FLOOR = 0.01  # relMSE = mean((x - r)^2 / (r^2 + FLOOR mean(r)^2)), so noise is relative to the scene's brightness
+MARGIN = 0.5  # standard errors added to the estimate, because rendering ends at the first of several low estimates
+# The error is proportional to a power of -1 to -1.5 of the number of samples. With the larger exponent, estimates are
+# not made much too late.
 POWER = 1.5
-MIN_STEP, MAX_STEP = 1.04, 2.5  # factors between the numbers of samples at consecutive estimates
-LOW, HIGH = SHARE // 4, SHARE * 8  # limits of a tile's number of samples, since the first samples miss rare light
-# Samples are distributed unevenly if this needs at most the first fraction of them, and saves at least the second
-# number (some seconds).
+MIN_STEP, MAX_STEP = 1.04, 2.5  # limits of the ratio of the numbers of samples at consecutive estimates
+LOW, HIGH = SHARE // 4, SHARE * 8  # limits of a tile's number of samples, because the first samples miss rare light
+# Samples are distributed unevenly if this requires at most the first fraction of the samples and saves at least the
+# second number of samples (some seconds).
 MAX_GAIN, MIN_SAVED = 0.8, 1 << 24
-# Ratio of a squared blur to its squared difference from a blur a quarter as wide: 1.14 for smooth light (blur grows
-# with the square of the radius), 1.31 for an edge within a pixel (power 3/2), 1.90 for an edge across pixels (power
-# 1/2); measured 0.8 to 1.3. The true value estimated below is more often too dark than too bright, so a lower ratio is
-# used.
+# The ratio of a squared blur to its squared difference from a blur a quarter as wide. It is 1.14 for smooth light,
+# where blur is proportional to the square of the radius, 1.31 for an edge within a pixel (power 3/2), and 1.90 for an
+# edge across pixels (power 1/2); measured values are 0.8 to 1.3. The true value estimated below is more often too dark
+# than too bright, so a lower ratio is used.
 BLUR = 1.1
-DARKEST = 0.4  # smallest true value assumed for a blurred pixel, as a fraction of the blurred value
+DARKEST = 0.4  # lower bound of the true value of a blurred pixel, as a fraction of the blurred value
 BLUR_POWER = 1.5  # assumed exponent of the radius in the squared blur
-MAX_BLUR, BLUR_AIM = 0.5, 0.25  # fractions of the requested error: above the first, start over and aim at the second
-SURE = 3.0  # standard errors by which blur must exceed MAX_BLUR before rendering starts over
+# Fractions of the requested error: if blur exceeds the first, rendering starts again with the second as the target.
+MAX_BLUR, BLUR_AIM = 0.5, 0.25
+SURE = 3.0  # number of standard errors by which blur must exceed MAX_BLUR before rendering starts again
 MIN_RADIUS = 1 / 64
-WINDOW = 3 * TILE  # pixels: a tile's noise is averaged half and half with that of this window
+WINDOW = 3 * TILE  # width in pixels of the window whose noise is averaged with that of a tile, in equal parts
 
 
 def squares(a: Picture, b: Picture) -> NDArray[np.float64]:
-    """Contribution of each pixel to the relMSE of the mean of two pictures with independent noise: (height, width)."""
+    """The contribution of each pixel to the relMSE of the mean of two pictures with independent noise, (height, width)."""
     true, floor = _agreed(a, b)
     result: NDArray[np.float64] = np.mean(0.25 * (a.astype(np.float64) - b) ** 2 / (true**2 + floor), axis=-1)
     return result
 
 
 def blur_error(a: Picture, b: Picture, blurs: Sequence[Picture]) -> Estimate:
-    """The part of the relMSE of the mean of two pictures that blur causes. `blurs` are four estimates (two from `a`,
-    two from `b`, all with independent noise) of the difference from a less blurred picture.
+    """The part of the relMSE of the mean of two pictures that blur causes.
 
-    Where light was blurred over a dark place, the true value is far below that of the pictures: it is estimated as the
-    picture minus the difference, using the two estimates that are not in the product, so that noise causes no bias.
+    If light is blurred over a dark region, the true value is far less than the value in the pictures. It is estimated
+    as the picture minus the difference, from the two estimates that are not in the product, so noise causes no bias.
+
+    blurs  four estimates of the difference from a less blurred picture, two from `a` and two from `b`, all with
+           independent noise
     """
     mean, floor = _agreed(a, b)
     d = [blur.astype(np.float64) for blur in blurs]
@@ -85,10 +90,10 @@ def blur_error(a: Picture, b: Picture, blurs: Sequence[Picture]) -> Estimate:
 def _agreed(a: Picture, b: Picture) -> tuple[NDArray[np.float64], float]:
     """An estimate of the true value of each pixel, and the floor of its square.
 
-    With the mean of both pictures, a single bright sample would reduce its own relative error. The mean is therefore
-    limited to the value that the surrounding pixels, or both pictures, agree on.
+    If the mean of the two pictures were used, a single bright sample would reduce its own relative error. The mean is
+    therefore limited to a value that is confirmed by the surrounding pixels or by both pictures.
     """
-    from scipy import ndimage  # imported here, since not every render needs SciPy
+    from scipy import ndimage  # imported here, because most renders do not need SciPy
 
     mean = 0.5 * (a.astype(np.float64) + b)
     agreed = np.maximum(ndimage.median_filter(mean, (3, 3, 1)), np.minimum(a, b))
@@ -97,30 +102,30 @@ def _agreed(a: Picture, b: Picture) -> tuple[NDArray[np.float64], float]:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value, and its standard deviation."""
+    """An estimated value and its standard deviation."""
 
     value: float
     deviation: float
 
     @staticmethod
     def mean(values: NDArray[np.float64]) -> Estimate:
-        """The mean of one value per pixel."""
+        """The estimate of a mean from one value per pixel."""
         return Estimate(float(np.mean(values)), float(np.std(values)) / math.sqrt(values.size))
 
     def with_another(self, other: Estimate) -> Estimate:
-        """The mean with another estimate, weighted by inverse variance."""
+        """The mean of this and another estimate, weighted by inverse variance."""
         a, b = (1.0 / max(one.deviation**2, 1e-300) for one in (self, other))
         return Estimate((a * self.value + b * other.value) / (a + b), (a + b) ** -0.5)
 
 
 @dataclass(frozen=True)
 class _Wide:
-    """Two halves that were too blurred, shown as long as the halves that replaced them have a larger error.
+    """Two halves that were too blurred. Their picture is used as long as that of the new halves has a larger error.
 
-    error   error of their picture
-    blur    the part of `error` due to blur
-    width   their `Until._width`
-    radius  their `Settings.radius`
+    error   error of the picture
+    blur    the part of the error due to blur
+    width   `Until._width` of the halves
+    radius  `Settings.radius` of the halves
     """
 
     halves: tuple[Render, Render]
@@ -131,29 +136,29 @@ class _Wide:
 
 
 class Until:
-    """A render that ends once its relMSE is estimated to be at most `error`; `passes.run` advances it to its `goal`.
+    """A render that ends once its estimated relMSE is at most `error`; `passes.run` advances it to its `goal`.
 
     error  the relMSE to reach
     most   maximum number of samples per pixel
-    aovs   whether to average albedo and normal of the first hit too, for the denoiser
+    aovs   whether to also average the albedo and the normal of the first hit, for the denoiser
     """
 
     def __init__(self, scene: Scene, settings: Settings, error: float, most: int, aovs: bool = False) -> None:
         self._scene, self._aovs = scene, aovs
         self._settings = replace(settings, measures=True) if settings.program.blurs else settings
         self.error, self._most = error, most
-        # seeds of the first samples, and of the later ones, which may be distributed unevenly
+        # the seeds of the first samples and of the later samples, which may be distributed unevenly
         self._seeds = [int(seed) for seed in np.random.SeedSequence(settings.seed).generate_state(4)]
         self._shares = not (settings.program.splats or settings.program.blurs)
         self._goal = FIRST
-        self._lost = 0  # samples of discarded pictures that were too blurred
-        self._narrowed = 0  # how many times pictures were discarded
+        self._lost = 0  # number of samples of discarded pictures, which were too blurred
+        self._narrowed = 0  # number of times that pictures were discarded
         self._halves = self._begun(settings.radius)
         self._wide: _Wide | None = None  # the last discarded halves
-        self._before = 0  # samples that determined the distribution of the others
-        self._pilot: tuple[Picture, Picture] | None = None  # their pictures
+        self._before = 0  # number of samples that determined the distribution of the others
+        self._pilot: tuple[Picture, Picture] | None = None  # the pictures from these samples
         self._share: Share | None = None
-        self._gain = 1.0  # samples needed when distributed unevenly, divided by those needed evenly, at the same error
+        self._gain = 1.0  # ratio of the samples needed with an uneven and an even distribution for the same error
 
     def _pair(self, seeds: list[int], share: Share | None) -> tuple[Render, Render]:
         a, b = (Render(self._scene, replace(self._settings, seed=seed), aovs=self._aovs, share=share) for seed in seeds)
@@ -163,22 +168,22 @@ class Until:
 
     @property
     def done(self) -> int:
-        """Samples per pixel so far, averaged over the pixels."""
+        """The number of samples per pixel so far, averaged over the pixels."""
         return self._lost + self._before + sum(self._counts)
 
     @property
     def goal(self) -> int:
-        """Samples per pixel at the next estimate of the error; once the error is small enough, the number done."""
+        """The number of samples per pixel at the next estimate, or the current number if the error is small enough."""
         if self.done == self._goal:
             noise, blur = self._errors()
-            # The estimate is uncertain if few pixels contain most of the error.
+            # The estimate is uncertain if most of the error is in a few pixels.
             error = noise.value + blur.value + MARGIN * math.hypot(noise.deviation, blur.deviation)
             if error > self.error:
                 self._go_on(error, noise, blur)
         return min(self._goal, self._most)
 
     def advance(self, count: int) -> None:
-        """Render `count` samples, or as many as one half still needs; the halves alternate."""
+        """Render `count` samples, or the remaining samples of one half if these are fewer; the halves alternate."""
         each = _halved(min(self._goal, self._most) - self._lost - self._before)
         needed = [most - n for most, n in zip(each, self._counts, strict=True)]
         behind = 0 if needed[0] >= needed[1] else 1
@@ -198,7 +203,7 @@ class Until:
         return np.asarray((first * a + second * b) / max(first + second, 1.0), np.float32)
 
     def _shown(self) -> tuple[Render, Render] | None:
-        """The discarded halves, if they are better than the current ones."""
+        """The discarded halves if their error is smaller than that of the current halves, else None."""
         return self._wide.halves if self._wide is not None and self.estimate() == self._wide.error else None
 
     def aov(self) -> dict[str, Picture]:
@@ -217,7 +222,7 @@ class Until:
         return self._settings.radius
 
     def estimate(self) -> float:
-        """The relMSE of the picture so far; inf if there are too few samples for an estimate."""
+        """The estimated relMSE of the current picture; inf if there are too few samples for an estimate."""
         least = math.inf if self._wide is None else self._wide.error
         if min(self._counts) == 0 and self._pilot is None:
             return least
@@ -225,7 +230,7 @@ class Until:
         return min(noise.value + blur.value, least)
 
     def _errors(self) -> tuple[Estimate, Estimate]:
-        """The errors due to noise and to blur."""
+        """The errors due to noise and due to blur."""
         a, b = self._pictures()
         noise = Estimate.mean(squares(a, b))
         if not self._settings.measures:
@@ -234,13 +239,13 @@ class Until:
         if not blurs:
             return noise, Estimate(0.0, 0.0)
         blur = blur_error(a, b, blurs)
-        if self._wide is not None:  # at a small radius noise dominates the measured blur; the earlier estimate helps
+        if self._wide is not None:  # at a small radius, noise dominates the measured blur; use the earlier estimate too
             expected = self._wide.blur.value * (self._width() / self._wide.width) ** BLUR_POWER
             blur = blur.with_another(Estimate(expected, expected))
         return noise, Estimate(max(blur.value, 0.0), blur.deviation)
 
     def _width(self) -> float:
-        """A number proportional to the mean radius of the maps so far."""
+        """A number that is proportional to the mean radius of the maps so far."""
         return self._settings.radius * float(sum(self._counts)) ** self._settings.program.shrinking
 
     def _pictures(self) -> tuple[Picture, Picture]:
@@ -251,11 +256,11 @@ class Until:
         first, second = (old * x + (1.0 - old) * y for old, x, y in zip(olds, self._pilot, (a, b), strict=True))
         return first, second
 
-    # ------------------------------------------------------------------ how far
+    # ------------------------------------------------------------------ goals
 
     def _go_on(self, error: float, noise: Estimate, blur: Estimate) -> None:
-        """Set the next goal if the error is too large; after the first samples, distribute the rest."""
-        # the factor by which the radius will have shrunk once the noise is small enough
+        """Set the next goal if the error is too large; after the first samples, distribute the remaining samples."""
+        # the factor by which the radius will shrink until the noise is small enough
         later = max(noise.value / ((1.0 - BLUR_AIM) * self.error), 1.0)
         later **= self._settings.program.shrinking
         sure = (blur.value - SURE * blur.deviation) * later**BLUR_POWER
@@ -267,7 +272,7 @@ class Until:
             return
         if self._shares and self._share is None and self.done == FIRST:
             self._share_out(error)
-        # number of evenly distributed samples that would be equivalent to those so far
+        # the equivalent number of evenly distributed samples
         worth = self._before + (self.done - self._before) / self._gain
         factor = min(max((error / self.error) ** (1.0 / POWER), MIN_STEP), MAX_STEP)
         more = (factor - 1.0) * worth * self._gain
@@ -289,7 +294,7 @@ class Until:
         self._wide, self._halves = wide, self._begun(radius)
 
     def _begun(self, radius: float) -> tuple[Render, Render]:
-        """Two halves with the given radius and separate seeds."""
+        """Start two halves with the given radius and different seeds."""
         self._settings = replace(self._settings, radius=radius)
         if self._narrowed == 0:
             return self._pair(self._seeds[:2], None)
@@ -311,8 +316,10 @@ class Until:
         return result | _sums("half", self._halves)
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Resume with bit-identical results. Raises ValueError, LookupError or ArithmeticError for sums of another
-        film."""
+        """Continue with bit-identical results.
+
+        Raises ValueError, LookupError or ArithmeticError if the state is that of another film.
+        """
         if "share" in state:
             pilot = state["pilot0"], state["pilot1"]
             shape = self._halves[0].height, self._halves[0].width, 3
@@ -348,11 +355,11 @@ def _halved(samples: int) -> tuple[int, int]:
 
 
 def shares(noise: NDArray[np.float64]) -> tuple[Share, float]:
-    """Distribute samples by each pixel's squared error: (relative number of samples per lane, samples needed divided by
-    those of an even distribution with the same error).
+    """Distribute samples according to the squared error of each pixel.
 
-    The error is smallest if the numbers are proportional to the square root of the noise (Neyman's allocation); tiles,
-    as in `Render`, keep coherent rays together.
+    Returns the relative number of samples per lane, and the number of samples divided by that of an even distribution
+    with the same error. The error is minimal if the numbers are proportional to the square root of the noise (Neyman
+    allocation). Samples are distributed to the tiles of `Render`, which keep coherent rays together.
     """
     from scipy import ndimage
 
@@ -365,7 +372,7 @@ def shares(noise: NDArray[np.float64]) -> tuple[Share, float]:
     variance = np.add.reduceat(lane, starts) / sizes
     wanted = np.sqrt(variance)
     scale = 1.0
-    for _ in range(20):  # until the mean is SHARE despite the clipping
+    for _ in range(20):  # until the mean is SHARE in spite of clipping
         result = np.clip(np.rint(scale * SHARE * wanted / max(float(np.mean(wanted)), 1e-300)), LOW, HIGH)
         scale *= SHARE / float(np.average(result, weights=sizes))
     total = float(np.average(variance, weights=sizes))

@@ -3,8 +3,8 @@
     gonio verify conductor --param alpha=0.3
     go.verify(go.Conductor(alpha=0.3)).passed
 
-Each law has its own file, in `laws` or in a package of your own; it tests a *subject*, a BSDF with given parameters
-(`subject`). This package depends on the BSDF protocol, but on no material. Names are imported on first use, since
+Each law has its own file, in `laws` or in your own package, and tests a *subject*: a BSDF with given parameters (see
+`subject`). This package depends on the BSDF protocol but not on any material. Names are imported on first use because
 `gonio verify` starts its worker process before it imports anything itself.
 """
 

@@ -30,7 +30,7 @@ SCAN = 64  # values along one parameter
 RAYS = 96  # pairs of directions per value
 JUMP = 6.0  # smallest ratio of a jump to the neighboring steps
 MIN_JUMP = 0.004  # smallest jump, relative to the value: smaller ones are invisible
-UNIFORM_PLACES = 1  # places for a material whose values must be the same for all rays
+UNIFORM_PLACES = 1  # places for a material whose parameters must be the same for all rays
 PLACES_PER_CHOICE = 9
 LEAST_CHOICES = 2
 
@@ -76,9 +76,9 @@ class Place:
 
 
 def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
-    """The places at which to test a subject in addition to the given one, without duplicates, in order of importance.
+    """The places at which to test a subject, apart from the given values: without duplicates, the most important first.
 
-    effort  the cost of the trial, which determines their number
+    effort  the effort of the run, which determines their number
     seed    seed of random places
     """
     along, others = axes(subject), _choices(subject)
@@ -126,7 +126,7 @@ WIDTHS = ((0.45, 0.85), (0.8, 0.3))  # positions of the widths along the two axe
 
 def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
     """Saturated values for all colors at once, with the channels of each color permuted differently. Every second set
-    also makes lobes narrow, so that their shadowing loss is too small to hide a Fresnel term above 1."""
+    also has narrow lobes, whose loss by shadowing is too small to hide a Fresnel term above 1."""
     colors = [axis for axis in along if axis.kind == "color"]
     narrow = {axis.path: _plain(axis.at(NARROW)) for axis in along if axis.kind == "alpha"}
     return [
@@ -138,13 +138,13 @@ def _colors(along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
 
 
 def _unequal(subject: Subject, along: list[Axis]) -> list[dict[str, tuple[float, ...]]]:
-    """Two unequal widths for each parameter that has one number or two equal ones."""
+    """Two unequal alphas for each width parameter whose value is a single number or a pair of equal numbers."""
     alphas = [axis for axis in along if axis.kind == "alpha" and _equal(tree.value_at(subject.model, axis.path))]
     return [{axis.path: _plain([float(axis.at(s)) for s in shares]) for axis in alphas} for shares in WIDTHS if alphas]
 
 
 def _inside(along: list[Axis], rng: np.random.Generator) -> dict[str, Any]:
-    """Random values of all parameters, with separate values for the two axes of a width."""
+    """Random values of all parameters, with separate values of alpha for the two axes."""
     return {axis.path: axis.at(rng.uniform(size=2) if axis.kind == "alpha" else rng.uniform()) for axis in along}
 
 
@@ -160,7 +160,7 @@ def _plain(value: Any) -> Any:
 
 def _choices(subject: Subject) -> list[dict[str, str | bool]]:
     """Each other option of every choice and each inverted flag, in rounds of one per parameter. Only the first few are
-    tested, since each requires the compilation of new code."""
+    tested, because each requires the compilation of new code."""
     if not isinstance(subject.model, BSDF) or subject.model.needs_uniform:
         return []
     turns: list[list[dict[str, str | bool]]] = []
@@ -173,34 +173,30 @@ def _choices(subject: Subject) -> list[dict[str, str | bool]]:
 
 
 def covered(subject: Subject, tried: list[Place]) -> str:
-    """A sentence without a capital letter and a period that lists the tested parameter values."""
+    """A description of the tested parameter values, without a capital letter at its start or a period at its end."""
     if not tried:
         reason = "" if axes(subject) else ", because no parameter declares a range"
         return f"tested at the given parameter values only{reason}"
     kinds = Counter(place.why for place in tried)
-    words = {why: f"{count} {_NAMES[why][count > 1]}" for why, count in kinds.items()}
-    in_ranges = _listed([words.pop(why) for why in _IN_RANGES if why in words])
+    words = {why: f"{count} {_NAMES[why]}" for why, count in kinds.items()}
     groups = [words[why] for why in _NAMES if why in words]
-    if in_ranges:  # discontinuities come last
-        groups.insert(len(groups) - ("jump" in words), f"{in_ranges} of the parameter ranges")
-    others = f"{len(tried)} other{'s' if len(tried) > 1 else ''} ({_listed(groups, ', and ')})"
+    others = f"{len(tried)} other setting{'s' if len(tried) > 1 else ''} ({_listed(groups)})"
     ranges = _listed([f"{axis.path} from {axis.low:g} to {axis.high:.4g}" for axis in axes(subject)])
     choices = " or ".join(place.words for place in tried if place.why == "choice")
     along = ", and with ".join(filter(None, [ranges, choices]))
     return f"tested at the given parameter values and at {others}, with {along}"
 
 
-def _listed(words: list[str], last: str = " and ") -> str:
-    """ "a, b and c", with the given text before the last one."""
-    return last.join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+def _listed(words: list[str]) -> str:
+    """ "a, b and c"."""
+    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
 
-# singular and plural, in the order of a sentence
-_NAMES = {"choice": ("other option", "other options"), "color": ("set of colors", "sets of colors")}
-_NAMES |= {"pair": ("pair of unequal widths", "pairs of unequal widths"), "corner": ("corner", "corners")}
-_NAMES |= {"edge": ("edge", "edges"), "interior": ("interior point", "interior points")}
-_NAMES |= {"jump": ("point at a discontinuity", "points at discontinuities")}
-_IN_RANGES = ("corner", "edge", "interior")
+# the kinds of settings, in the order of the sentence
+_NAMES = {"choice": "with another option", "color": "with saturated colors"}
+_NAMES |= {"pair": "with unequal widths along the two axes"}
+_NAMES |= {"corner": "with every parameter at an end of its range", "edge": "with one parameter at an end of its range"}
+_NAMES |= {"interior": "with random values", "jump": "just past a discontinuity"}
 
 
 def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis, ...]) -> Place | None:
@@ -217,7 +213,7 @@ def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis,
 
 
 def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]]:
-    """Parameter values just past a jump, by path, the largest jump first.
+    """Parameter values just past a jump, by path, in decreasing order of the jump.
 
     Each parameter is swept through its range, with the others as given. A jump is a step of `eval`, `pdf` or the mean
     weight, from one value to the next, that is many times as large as the neighboring steps.

@@ -1,10 +1,10 @@
 """Cells of the sphere that follow a BSDF's samples, for the chi-square test.
 
 A lobe of width 0.005 covers a hundred-thousandth of the sphere: fixed cells would either contain the whole lobe in one
-cell, or number millions. So a small first set of samples (the pilot) places the edges of 100 rows per side of the
-surface and of 200 columns per row: at quantiles of the pilot, at equal steps, and at increasing distances from its
-median for the tails. The coordinates are (1 - |z|, a pseudo-angle of (x, y)): areas are equal, there is no
-transcendental function, and no cancellation near the pole.
+cell, or number millions. A small first set of samples (the pilot) therefore determines the edges of 100 rows per side
+of the surface and of 200 columns per row. The edges lie at quantiles of the pilot, at equal steps, and, for the tails,
+at increasing distances from its median. The coordinates are 1 - |z|, in which equal steps have equal areas, and a
+pseudo-angle of (x, y). They need no transcendental function and are computed without cancellation near the pole.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from .subject import Subject
 
 CELLS = (100, 200)  # rows and columns per side of the surface
 PILOT = 1 << 15  # samples for CELLS; fewer cells need fewer
-FINEST = 3e-5  # smallest spread of the azimuth that is tested: 120 steps of float32 directions
+FINEST = 3e-5  # smallest spread of the azimuth that is tested: 120 times the spacing of float32 directions
 
 Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # maps rows (wo, wi), (N, 3) each, to (N,)
 
 
 class Grid(NamedTuple):
-    """The cells for several wo.
+    """The cells for several directions wo.
 
     wo       directions, (N, 3)
     sides    the sides of the surface that have cells: 1 above, -1 below
     rows     edges of 1 - |z|, (N, sides, rows + 1), float32
     columns  edges of the pseudo-angle, (N, sides, rows, columns + 1), float32
-    pilot    the samples that placed the cells, (n, 3) for each wo
+    pilot    the samples from which the cells were placed, (n, 3) for each wo
     """
 
     wo: np.ndarray
@@ -50,7 +50,7 @@ class Grid(NamedTuple):
 
 
 def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
-    """Place cells by a subject's samples for each wo, (N, 3); None if no sample has a density.
+    """Place cells according to a subject's samples for each wo, (N, 3). Returns None if no sample has a density.
 
     seed   seed of the samples
     cells  numbers of rows and columns per side of the surface
@@ -67,7 +67,7 @@ def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = 
 
 
 def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS) -> Grid:
-    """Place cells by given samples, on the sides of the surface with samples or with a positive pdf.
+    """Place cells according to given samples, on the sides of the surface with samples or with a positive pdf.
 
     pilot  samples (n, 3) for each wo
     pdf    function (wo, wi) that returns the density
@@ -136,7 +136,7 @@ def _edges(groups: Sequence[np.ndarray], low: float, high: float, count: int) ->
     even, far = count // 4 - 2, count // 4
     many = count - 1 - even - far
     quantiles = np.arange(many) * np.maximum(sizes - 1, 0)[:, None] // (many - 1)
-    # a group without values reads that of another, and gets other edges below
+    # a group without values reads those of another; its edges are replaced below
     place = (np.cumsum(sizes) - sizes)[:, None] + quantiles
     own = np.append(np.concatenate(inside), low)[place]
     first, middle, last = own[:, many // 4], own[:, many // 2], own[:, 3 * many // 4]
@@ -158,8 +158,8 @@ def _edges(groups: Sequence[np.ndarray], low: float, high: float, count: int) ->
 
 
 def _growing(first: np.ndarray, last: float, count: int) -> np.ndarray:
-    """Distances in geometric progression, (groups, count), up to a ratio of at least 1e4, since the tail of a lobe of
-    width 1e-4 extends to a million times its height."""
+    """Distances in geometric progression, (groups, count), up to a ratio of at least 1e4, because the tail of a lobe
+    of width 1e-4 extends to a million times its height."""
     first = np.maximum(first, 1e-10)[:, None]
     return np.asarray(first * np.maximum(last / first, 1e4) ** (np.arange(count) / max(count - 1, 1)))
 

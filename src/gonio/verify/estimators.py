@@ -1,4 +1,4 @@
-"""The albedos of a BSDF that different integrators measure, and the resulting bias of a picture.
+"""The albedos of a BSDF that different estimators compute, and the resulting bias of a picture.
 
 A path tracer uses a BSDF in two ways. It traces sampled directions, whose mean weight is an albedo; and it samples
 lights, with `eval` as the value and `pdf` for the balance heuristic that combines both (Veach1997, eq. 9.10). In a
@@ -23,7 +23,7 @@ from .severity import ACCURACY, Bias, Grade, degrees, percent, seeds, summed, vi
 from .subject import Subject
 
 SAMPLES = 1 << 13  # per wo; stratified, so that the mean is accurate to about 1e-3 of a weight
-NEGLIGIBLE = 2e-4  # largest difference of two albedos that is ignored
+NEGLIGIBLE = 2e-4  # largest difference between two albedos that is ignored
 SPHERE = 0.25 / np.pi  # density of light samples: uniform on the sphere, as for a constant environment
 BINS = 16  # four quadrants of azimuth, within 45 degrees of the normal and beyond, on each side of the surface
 UNDEFINED = 512  # random wi per wo at which non-finite values are counted
@@ -44,7 +44,7 @@ class Estimates(NamedTuple):
     noise     two standard errors of `sampled` and `both`
     parts     `value`, `sampled` and `consistent` per bin of wi, averaged over the channels, (3, N, BINS)
     doubt     three standard errors of the last two, (N, BINS)
-    unseen    fraction of light that rare samples of huge weight may add beyond the observed ones, (N,)
+    unseen    fraction of light that rare samples of very large weight may add to the observed light, (N,)
     claimed   int pdf dwi, (N,)
     drawn     fraction of samples that have not failed and are not delta samples, (N,)
     """
@@ -65,7 +65,7 @@ class Estimates(NamedTuple):
 
 
 def of_subject(subject: Subject) -> Estimates:
-    """The estimates for radiance, which are computed when the first law fails and cached for all laws."""
+    """The estimates for radiance. They are computed when the first law fails, and cached for all laws."""
     if "estimates" not in subject.memo:
         subject.memo["estimates"] = estimate(subject)
     estimates: Estimates = subject.memo["estimates"]
@@ -167,7 +167,7 @@ def _bins(w: np.ndarray) -> np.ndarray:
 
 
 def _split(value: Scalar, w: Direction) -> list[Scalar]:
-    """A Dr.Jit value in the entry of its bin, and 0 in the others. This runs in the kernel that sums the values, since
+    """A Dr.Jit value in the entry of its bin, and 0 in the others. This runs in the kernel that sums the values:
     sixteen columns in NumPy take longer than most models."""
     dr = backend.drjit()
     sides = [(~side, side) for side in (w.x > 0.0, w.y > 0.0, dr.abs(w.z) > np.sqrt(0.5), w.z > 0.0)]
@@ -228,8 +228,8 @@ def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None 
     part   "all", or only the part that is due to weights other than eval / pdf ("weights") or to a pdf other than that
            of the samples ("pdf")
     light  the estimates to use; None for those of the subject for radiance
-    Of the errors without light samples, with light samples and under a small light, the largest counts. The field
-    `both` of the result is the error with light samples.
+    The bias is the largest of three errors: without light samples, with light samples, and under a small light. The
+    field `both` of the result is the error with light samples.
     """
     light = light or of_subject(subject)
     biases = []
@@ -238,7 +238,7 @@ def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None 
         off = np.where(np.abs(off) > light.noise + NEGLIGIBLE, off, 0.0)
         biases.append(summed(off, np.maximum(light.value, 0.0), light.wo, light.mass))
     by_samples, both = biases
-    # the same under a small light, per bin: an excess on one side does not cancel a deficit on another
+    # the same under a small light, per bin: an excess on one side does not cancel a deficit on the other
     value, drawn, own = light.parts
     apart = np.abs((own if part == "pdf" else drawn) - (own if part == "weights" else value))
     # a bin edge may cut a lobe, whose samples then fall on either side by chance: half a percent of all light is
@@ -253,7 +253,7 @@ def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None 
     if worse.grade is Grade.INVISIBLE and part != "pdf" and light.unseen.max() > 0.01:
         row = int(np.argmax(light.unseen))
         share, theta = percent(float(light.unseen[row])), float(directions.angles(light.wo[row])[0])
-        where = f"individual samples carry more than {share} of the light, wo at {degrees(theta)}"
+        where = f"individual samples carry more than {share} of the light for wo at {degrees(theta)}"
         return dataclasses.replace(worse, kind="noise", where=where)
     if subject.transmits and light is subject.memo.get("estimates") and worse.grade is Grade.INVISIBLE:
         other = sampling_bias(subject, part, estimate(subject, "importance"))
@@ -275,14 +275,14 @@ def gain_bias(subject: Subject) -> Bias:
 
 
 def loss_bias(subject: Subject) -> Bias:
-    """The power lost by a lossless variant, which claims to reflect all of it."""
+    """The power lost by the lossless variant of a material, which should reflect all of it."""
     light = _of_power(subject)
     lost = np.maximum(1.0 - light.value, 0.0)
     return summed(-lost, np.ones_like(lost), light.wo, light.mass, "lost")
 
 
 def stated_bias(subject: Subject) -> Bias:
-    """The reflected power minus the stated albedo, which is also the error of a base weighted by that albedo."""
+    """The reflected power minus the stated albedo, which is also the error of a base layer weighted by that albedo."""
     light = _of_power(subject)
     stated = subject.model.stated_albedo(light.wo)
     off = light.value - stated.value

@@ -1,7 +1,7 @@
 """The expectation of the chi-square test: the integral of a pdf over every cell.
 
-Cells are divided until their error is below a tolerance, which depends on the noise of their counts. The samples that
-placed the cells also cause divisions, since a lobe may be narrower than a cell.
+Cells are divided until their error is below a tolerance, which depends on the noise of their counts. The samples from
+which the cells were placed also cause divisions, because a lobe may be narrower than a cell.
 
     expected = expect(subject, grid, tolerance)
 """
@@ -29,8 +29,8 @@ class Expectation(NamedTuple):
     cells   probability of each cell, (N, sides, rows, columns)
     total   integral of the pdf over all cells, (N,)
     error   error of `total` due to cells that are not fully divided, (N,)
-    unseen  estimate of the probability that each cell lacks because of lobes that no sample of the pilot has hit (see
-            `cubature`), (N, sides, rows, columns)
+    unseen  estimate of the probability that is missing from each cell because no sample of the pilot has hit a lobe
+            (see `cubature`), (N, sides, rows, columns)
     """
 
     cells: np.ndarray
@@ -100,8 +100,8 @@ def _quarters(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _points(look: _Look, grid: Grid, owner: np.ndarray) -> Points:
-    """The samples that placed the cells of a grid, at (1 - |z|, azimuth) in the boxes of the cells `owner`. The light
-    of a sample is its fraction of all samples."""
+    """The samples from which the cells of a grid were placed, at (1 - |z|, azimuth) in the boxes of the cells `owner`.
+    The light of a sample is its fraction of all samples."""
     dr = backend.drjit()
     kind = backend.types("float32")
     which = np.repeat(np.arange(len(grid.wo)), [len(samples) for samples in grid.pilot])

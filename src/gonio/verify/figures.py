@@ -1,4 +1,4 @@
-"""The evidence that laws collect, and the figures of it in the report, which Matplotlib draws as SVG."""
+"""The data that laws collect as evidence, and the figures that Matplotlib draws from them, as SVG."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class SampleCells:
         _label(axes[2], "x of wi", "y of wi", "difference")
         figure.colorbar(shown, ax=axes[2], shrink=0.85, label="standard deviations").outline.set_visible(False)
         caption = (
-            f"{self.drawn:,} samples for the wo with the lowest p-value, projected along the normal, around the lobe. "
+            f"{self.drawn:,} samples near the lobe for the wo with the lowest p-value, projected along the normal. "
             "If the law holds, the difference is only noise."
         )
         return _svg(figure), caption

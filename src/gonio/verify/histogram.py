@@ -1,4 +1,4 @@
-"""Pearson's chi-square test of a model's samples against its pdf, in cells that follow the samples.
+"""Pearson's chi-square test of a model's samples against its pdf, in cells that adapt to the samples.
 
 The counts come from a second draw, independent of the pilot that placed the cells: sampling, binning and counting are
 one kernel, which stores only the counts. Failed samples, delta samples and samples outside all cells are counted too:
@@ -23,12 +23,12 @@ from .expectation import Expectation
 from .subject import Subject, guarded
 
 COARSE = (10, 10)  # rows and columns that the coarse test merges into one cell, to detect small errors of broad lobes
-MIN_EXPECTED = 10.0  # samples in a pooled cell: Pearson's statistic then follows its limit well within the noise
+MIN_EXPECTED = 10.0  # samples in a pooled cell, so that Pearson's statistic is close to its limiting distribution
 
 
 class Counts(NamedTuple):
-    """The number of samples in each cell (N, sides, rows, columns), that of all others (N,), and the number of samples
-    drawn per wo."""
+    """The number of samples in each cell, (N, sides, rows, columns); the number outside all cells, (N,); and the number
+    of samples drawn per wo."""
 
     cells: np.ndarray
     others: np.ndarray
@@ -65,7 +65,7 @@ def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
 
 
 def count_given(samples: np.ndarray, drawn: int, grid: Grid) -> Counts:
-    """Count given samples (n, 3) in a grid with a single wo. The rest of the `drawn` samples are those that failed."""
+    """Count given samples (n, 3) in a grid with a single wo. The rest of the `drawn` samples count as failed."""
     kind = backend.types("float32")
     wi = backend.vector_of(samples, 3, kind)
     return _counted(grid, kind.module.UInt32(0), wi, kind.bool(True), drawn)
@@ -103,8 +103,8 @@ def compare(expected: Expectation, counts: Counts, row: int, grid: Grid | None =
     """The p-values for one wo.
 
     row   index of wo
-    grid  the cells, if rounding is to be allowed for: cells barely larger than the spacing of float32 directions gain
-          or lose samples by rounding alone
+    grid  the cells, to allow for rounding: cells barely larger than the spacing of float32 directions gain or lose
+          samples by rounding alone; None to ignore rounding
     """
     n = counts.drawn
     e, o = expected.cells[row] * n, counts.cells[row]

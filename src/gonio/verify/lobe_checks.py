@@ -23,7 +23,7 @@ from .subject import Subject, guarded
 SINGLE = 2e-3  # tolerated error of float32
 SLOPES = 1e-4  # tolerated error of derivatives
 FORWARD = 1e-4  # fraction of light below which a lobe need not be reciprocal
-CLOSE = 0.9  # fraction of the oblique views at which a lobe that misses the mirror direction lies next to it
+CLOSE = 0.9  # fraction of oblique views at which a lobe must lie next to the mirror direction to count as an error
 BOUNCED = 1e-6  # relative deviation from a line that rounding cannot explain
 FLAT = 1e-3  # difference of an index from 1 below which nothing is refracted
 
@@ -98,8 +98,8 @@ def distinct(a: float, b: float) -> tuple[str, str]:
 def direction(probe: Probe) -> Misses:
     """Check that directions are unit vectors, and that refraction follows Snell's law with the lobe's own eta.
 
-    Reflection far from the mirror direction, and transmission without refraction, are tested for reciprocity only,
-    since gratings and corner cubes have such lobes.
+    Reflection far from the mirror direction, and transmission without refraction, are tested only for reciprocity,
+    because gratings and corner cubes have such lobes.
     """
     for rows, n, o, i in probe.lobes(probe.radiance):
         eta = probe.radiance.eta[rows, n]
@@ -116,7 +116,7 @@ def direction(probe: Probe) -> Misses:
         # a grating has orders next to the mirror direction, with one exactly along it or in pairs on both sides of it
         _, exact = lobes.along(there := lobes.rows_of(probe.radiance, rows), mirror)
         _, paired = lobes.along(there, _opposite_order(o, i))
-        # not near the normal, where the mirror direction and the way back to wo coincide
+        # not near the normal, where the mirror direction and the direction back to wo coincide
         oblique = ~through & (np.hypot(o[:, 0], o[:, 1]) > 0.2)
         close = oblique & ~exact & ~paired & (np.abs(i - mirror)[:, :2].max(1) < 0.1)
         if close.sum() < CLOSE * oblique.sum():
@@ -136,25 +136,25 @@ def _opposite_order(o: np.ndarray, i: np.ndarray) -> np.ndarray:
 def _snell(o: np.ndarray, i: np.ndarray, eta: np.ndarray, refracted: np.ndarray) -> Miss:
     off = np.abs(i[:, :2] + o[:, :2] / eta[:, None]).max(1) * refracted
     inverse = np.abs(i[:, :2] + o[:, :2] * eta[:, None]).max(1) * refracted
-    text, cause = "not refracted according to Snell's law for eta of the sample", ""
+    text, cause = "not refracted according to Snell's law for the eta of the sample", ""
     wrong = off > SINGLE
     if wrong.any() and np.abs(i + o)[wrong].max() < SINGLE:
-        cause = "the light passes straight through, but `eta` is not 1: is it that of another lobe?"
+        cause = "the light passes straight through, but `eta` is not 1: is it the eta of another lobe?"
     elif wrong.any() and inverse[wrong].max() < SINGLE:
         text += ", but for 1 / eta"
-        cause = "Snell's law holds for 1 / eta: is the refraction inverted, or `eta` that of the other side?"
+        cause = "Snell's law holds for 1 / eta: is the refraction inverted, or is `eta` that of the other side?"
     return _miss(off, text, o, i, cause)
 
 
 def _unstated_index(o: np.ndarray, i: np.ndarray, straight: np.ndarray) -> Misses:
-    """Check that samples with eta = 1 do not refract."""
+    """Check that samples with eta = 1 are not refracted."""
     sin_o, sin_i = np.hypot(o[:, 0], o[:, 1]), np.hypot(i[:, 0], i[:, 1])
     usable = straight & (sin_o > 0.1) & (sin_i > 0.1)
     index = sin_o[usable] / sin_i[usable]
     if len(index) > 3 and np.ptp(index) < 1e-3 * index.mean() and abs(index.mean() - 1.0) > FLAT:
         size = np.where(usable, abs(index.mean() - 1.0), 0.0)
-        text = f"refracted with an index of {index.mean():.4g}, but eta of the samples is 1"
-        yield _miss(size, text, o, i, "is `eta` of transmitted samples left at 1?")
+        text = f"light is refracted with an index of {index.mean():.4g}, but eta of the samples is 1"
+        yield _miss(size, text, o, i, "`eta` of transmitted samples is 1: was it never set?")
 
 
 def indices(probe: Probe) -> Misses:
@@ -172,14 +172,14 @@ def indices(probe: Probe) -> Misses:
         if named is not None:
             off[through] = np.abs(above / named - 1.0)
             stated, expected = distinct(float(above[np.argmax(np.abs(above / named - 1.0))]), named)
-            yield _miss(off, f"eta from above is {stated}, but {expected} according to the parameters", o, i)
+            yield _miss(off, f"eta from above is {stated}, but should be {expected} according to the parameters", o, i)
         elif np.ptp(above) > FLAT * np.median(above):
             off[through] = np.abs(above / np.median(above) - 1.0)
-            yield _miss(off, "eta from below is not the inverse of that from above", o, i)
+            yield _miss(off, "eta from below is not the inverse of eta from above", o, i)
 
 
 def _named_index(subject: Subject) -> float | None:
-    """The index below divided by that above, if a parameter of the material itself defines it."""
+    """The index below divided by that above, if a parameter of the material defines it."""
     names = subject.parameters
     try:
         if "eta" in names and names["eta"].kind == "float":
@@ -209,7 +209,7 @@ def modes(probe: Probe) -> Misses:
         row = int(np.argmax(off))
         ratio, expected = distinct(float(radiance[row].mean() / max(power[row].mean(), 1e-12)), float(factor[row]))
         verb = "transmits" if through[row] else "reflects"
-        text = f"{verb} {ratio} times as much radiance as power instead of {expected} (1 / eta^2)"
+        text = f"{verb} {ratio} times as much radiance as power instead of {expected} times (1 / eta^2)"
         total = np.sum(probe.power.carried[rows] * probe.power.valid[rows][..., None], axis=1)
         cause = _power_of_index(radiance, power, eta, through & exists, total)
         cause = cause or _one_side(radiance, power, eta, through & exists, o[:, 2] > 0.0)
@@ -242,7 +242,7 @@ def _power_of_index(
             text = "1 / eta" if exponent == -1.0 else f"eta^{exponent:g}" if exponent else "1"
             known = of_power or conserved(1.0)
             guess = wrong if of_power else right if known else f"{right}, or {wrong}"
-            return f"the ratio of radiance to power is {text}: {guess}?"
+            return f"the ratio of radiance to power is {text}; possible mistake: {guess}"
     return ""
 
 
@@ -280,12 +280,12 @@ def way_back(probe: Probe) -> Misses:
         row = int(np.argmax(off))
         one_way, other_way = distinct(there[row].mean(), back[row].mean())
         cause = _of_way_back(probe, o, there, back, exists & (o[:, 2] * i[:, 2] < 0.0))
-        yield _miss(off, f"carries {one_way} of the power from wo to wi, but {other_way} back", o, i, cause)
+        yield _miss(off, f"carries {one_way} of the power from wo to wi, but {other_way} from wi to wo", o, i, cause)
 
 
 def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarray, through: np.ndarray) -> str:
-    """The cause if the light carried one way is a constant times that carried back, for all views of a side, or if
-    reflection from the denser side follows Schlick's curve at the angle on that side."""
+    """The cause if the light carried in one direction is a constant times that carried in the reverse direction for
+    all views of a side, or if reflection from the denser side follows Schlick's curve at the angle on that side."""
     off = (_relative(there, back) > 1e-4) & through
     if off.sum() < 4:
         return ""
@@ -295,7 +295,8 @@ def _of_way_back(probe: Probe, o: np.ndarray, there: np.ndarray, back: np.ndarra
         ratio = there[rows] / back[rows]
         if rows.sum() >= 4 and np.ptp(ratio, axis=0).max() < 1e-3 * ratio.max():
             color = ", ".join(f"{c:.3g}" for c in np.median(ratio, axis=0))
-            return f"light from {where} carries ({color}) times the power of its reverse: a tint in one direction only?"
+            words = f"light from {where} carries ({color}) times the power of its reverse"
+            return f"{words}; possible mistake: a tint in one direction only"
     reflected = np.sum(power.carried * (power.valid & ~power.through(wo))[..., None], axis=1).mean(1)
     eta = np.sum(power.eta * power.through(wo), axis=1)
     for side, where in ((1.0, "outside"), (-1.0, "inside")):
@@ -317,7 +318,7 @@ def fresnel(probe: Probe) -> Misses:
     through = power.through(wo)
     refracted = through & (np.abs(power.eta - 1.0) > FLAT)
     if index is None or abs(index - 1.0) < FLAT or (subject.transmits and not refracted.any()):
-        return  # a thin slab transmits without refraction, or nothing if it is black, and follows another curve
+        return  # a thin slab transmits without refraction (or nothing, if it is black), and follows another curve
     if "delta" in subject.breaches:
         return  # declared, as for a film: its reflectance does not depend on this index alone
     cosine, ratio = np.abs(wo[:, 2]), np.where(wo[:, 2] > 0.0, index, 1.0 / index)
@@ -393,7 +394,7 @@ def rotation(probe: Probe) -> Misses:
         lost = np.where(exists | (carried.max(1) < FORWARD), 0.0, np.inf)
         cause = next(
             (
-                f"the sampled direction has the same {k} as wo: a wrong sign?"
+                f"the sampled direction has the same {k} as wo; possible mistake: a wrong sign"
                 for k, m in KEPT
                 if np.abs(i - o * m).max() < 1e-4
             ),
@@ -424,8 +425,8 @@ def tint(probe: Probe) -> Misses:
 
 
 def _bounces(probe: Probe, name: str, rows: np.ndarray, i: np.ndarray) -> bool:
-    """Whether a lobe's light is a power series in an albedo, that is, reflected or transmitted with it once, twice, and
-    so on, as between two panes.
+    """Whether a lobe's light is a power series in an albedo, as for light that is reflected or transmitted once, twice,
+    and so on, as between two panes.
 
     name  path of the albedo
     """

@@ -1,4 +1,4 @@
-"""The delta lobes of a BSDF, found from its samples: their directions, the light they carry, and their probabilities.
+"""The delta lobes of a BSDF, determined from its samples: their directions, carried light and probabilities.
 
 `eval` is 0 for a delta lobe, but `sample` determines it completely: the direction, the probability (`pdf` of a delta
 sample), and the light that it carries, weight x pdf, which does not depend on how the lobe is selected.
@@ -15,7 +15,7 @@ from . import directions
 from .subject import Subject
 
 DRAWN = 256  # samples per wo, in equal steps of the random number that selects the lobe
-ENDS = (1e-7, 1e-5, 1e-4, 1e-3)  # further values near its ends, where lobes of small probability are
+ENDS = (1e-7, 1e-5, 1e-4, 1e-3)  # further values near its ends, which select lobes of small probability
 MAX_LOBES = 6  # per wo
 NEAR = 1e-3  # directions that differ by less belong to one lobe
 
@@ -26,8 +26,8 @@ class Lobes(NamedTuple):
     valid   whether a direction has the lobe, (N, L)
     wi      direction of the lobe, (N, L, 3)
     weight  weight of its samples, (N, L, channels)
-    pdf     its probability, as the samples state it, (N, L)
-    eta     index on wi's side divided by that on wo's, as the samples state it, (N, L)
+    pdf     its probability, as given by the samples, (N, L)
+    eta     index on wi's side divided by that on wo's side, as given by the samples, (N, L)
     share   observed fraction of the samples, accurate to about 0.01, (N, L)
     """
 
@@ -67,7 +67,7 @@ def of(
 
     seed       seed of the samples
     mode       as in `BSDF.sample`
-    precision  precision of the samples; None for the best
+    precision  precision of the samples; None for the highest
     """
     u = chosen(DRAWN, seed)
     n, k = len(wo), len(u)
@@ -82,7 +82,7 @@ def of(
         first = np.argmax(left, axis=1)
         there = left[rows, first]
         direction = wi[rows, first]
-        # two orders of a grating may share a direction: their probabilities distinguish them
+        # two orders of a grating may have the same direction; their probabilities distinguish them
         mine = (np.abs(wi - direction[:, None]).max(2) <= NEAR) & (
             np.abs(pdf - pdf[rows, first][:, None]) <= 1e-5 * pdf[rows, first][:, None]
         )

@@ -1,7 +1,7 @@
-"""The files of a report: report.json, and one self-contained report.html with pictures.
+"""The files of a report: report.json, and a self-contained report.html with figures.
 
-The page needs neither network nor scripts: figures are inline SVG, and colors follow the reader's light or dark
-setting.
+The page needs neither a network connection nor scripts: its figures are inline SVG, and its colors follow the light or
+dark setting of the browser.
 """
 
 from __future__ import annotations
@@ -77,10 +77,10 @@ def page(report: Report) -> str:
         word = f"{word if broken else 'No law is violated'}; not tried: {', '.join(report.untried)}"
         kind = kind if broken else "declared"
     tests = (
-        f"{report.tests} statistical tests, each at a significance level of {report.threshold:.2e} (0.01 overall, "
-        "Sidak correction); a rejection counts only if a second seed confirms it."
+        f"The report includes {report.tests} statistical tests, each at a significance level of {report.threshold:.2e} "
+        "(0.01 overall, Sidak correction). A rejection counts only if a test with a second seed confirms it."
         if report.tests
-        else "No statistical tests."
+        else "The report includes no statistical tests."
     )
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8>",
@@ -133,13 +133,13 @@ def _card(card: Card, number: int) -> str:
     lines = "".join(f"<p class=soft>{html.escape(line)}</p>" for line in below)
     return (
         f"<h2>{html.escape(card.title)}</h2>{failed}"
-        f"<table><tr><th><th>law<th>verdict<th>figure<th>allowed{''.join(rows)}</table>{lines}{''.join(details)}"
+        f"<table><tr><th><th>law<th>verdict<th>measured<th>allowed{''.join(rows)}</table>{lines}{''.join(details)}"
     )
 
 
 def _detail(v: Verdict, anchor: str) -> str:
     rows: list[tuple[str, str]] = [("reason", html.escape(line)) for line in v.why]
-    rows.append(("figure", html.escape(v.shown)))
+    rows.append(("measured", html.escape(v.shown)))
     rows.append(("tolerance", html.escape(v.reason)))
     if v.p is not None:
         rows.append(("lowest p-value", f"{v.p:.3g}"))

@@ -1,10 +1,10 @@
 """The quality of a BSDF's sampling: measurements, not verdicts.
 
     gonio models --quality
-    go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % of samples fail, ..."
+    go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % of the samples fail, ..."
 
-A path tracer multiplies by the weight of each sample, so the variance of the weight is noise in the picture, and a
-failed sample is a wasted path. Both can be high even if every law holds.
+A path tracer multiplies the throughput by the weight of each sample. The variance of the weight therefore causes noise,
+and a failed sample wastes a path. Both can be large even if every law holds.
 """
 
 from __future__ import annotations
@@ -50,23 +50,28 @@ class Quality:
 
     @property
     def words(self) -> str:
-        """The measures as text: "sampling: 2.1 % of samples fail, variance of the weight 0.04, ..."."""
-        return "sampling: " + ", ".join(text for text in self.texts if text)
+        """The measures as text: "sampling: 2.1 % of the samples fail, the relative variance of ... is 0.04, ..."."""
+        failed, variance, cosine, ideal = self.numbers
+        compared = f"{cosine} times that of cosine sampling and " if cosine else ""
+        return (
+            f"sampling: {failed} of the samples fail, the relative variance of the weights is {variance}, "
+            f"and the efficiency is {compared}{ideal} of the ideal"
+        )
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
-        """The four measures as text; "" for one that is None."""
+        """The four measures as labeled text; "" for a measure that is None."""
         failed, variance, cosine, ideal = self.numbers
         return (
-            f"{failed} of samples fail",
-            f"variance of the weight {variance}",
-            cosine and f"{cosine} times as efficient as cosine sampling",
-            f"{ideal} of the ideal efficiency",
+            f"{failed} of the samples fail",
+            f"relative variance of the weights: {variance}",
+            cosine and f"efficiency relative to cosine sampling: {cosine}",
+            f"efficiency relative to ideal sampling: {ideal}",
         )
 
     @property
     def numbers(self) -> tuple[str, str, str, str]:
-        """The four measures as numbers with their units; "" for one that is None."""
+        """The four measures as numbers with units; "" for a measure that is None."""
         cosine = "" if self.cosine is None else _short(self.cosine)
         return f"{100.0 * self.failed:.2g} %", _short(self.variance), cosine, f"{100.0 * self.ideal:.3g} %"
 
@@ -115,7 +120,7 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     rng = np.random.default_rng([seed, 91])
     wo = np.concatenate([side * directions.at(np.array(THETA), 20.0) for side in subject.sides])
     rows = directions.single(np.repeat(wo, SAMPLES, axis=0))
-    # power: the factor eta^2 of radiance cancels where light exits, and is not noise
+    # power: the factor eta^2 of radiance cancels when light exits again, and causes no noise
     s = subject.sample(rows, directions.numbers(rng, len(rows)), POWER, "float32")
     shape = (len(wo), SAMPLES)
     valid = (s.pdf > 0.0).reshape(shape)

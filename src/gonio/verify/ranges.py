@@ -1,4 +1,4 @@
-"""The ranges that the parameters of a BSDF declare, as the axes along which it is tested."""
+"""The declared ranges of the parameters of a BSDF, as axes along which the BSDF is tested."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..material import BSDF, Parameter, tree
 from ..material.parameters import pair_of
 from .subject import Subject
 
-WIDE = 30.0  # ratio of the ends above which a range is scanned and sampled in equal ratios
+WIDE = 30.0  # ratio of the ends above which a range is scanned and sampled in steps of equal ratio
 MARGIN = 0.02  # fraction of a range that is left out at an excluded end
-MIN_ALBEDO = 0.01  # for plugins whose failed samples have weight 0: black samples would count as failed
-TURNS = (0.4, 5.8)  # range of angles: no rotation, or a full turn, would hide that something is not rotated
-MIN_RATIO = 1e-4  # first value divided by the last, for a range that starts at 0 and is divided in equal ratios
+MIN_ALBEDO = 0.01  # for plugins whose failed samples have weight 0: samples of black would count as failed
+TURNS = (0.4, 5.8)  # range of angles: at 0 or a full turn, a missing rotation would not be detected
+MIN_RATIO = 1e-4  # first value divided by the last, for a range that starts at 0 and has steps of equal ratio
 
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """The range of one parameter, along which it is tested. `ratio` is whether it is divided in equal ratios."""
+    """The range of one parameter, along which the BSDF is tested. `ratio` states whether steps have equal ratios."""
 
     path: str
     low: float
@@ -60,8 +60,8 @@ def axes(subject: Subject) -> list[Axis]:
 
 
 def _becomes_delta(subject: Subject, path: str, value: float) -> bool:
-    """Whether an inner material has a delta lobe at this value although the outer one declares none and hence does not
-    support such lobes."""
+    """Whether an inner material has a delta lobe at this value, although the outer one declares none and therefore does
+    not support delta lobes."""
     if _hides_delta(subject.model):
         return False  # this is already so at the given values, which are tested anyway
     try:

@@ -1,4 +1,4 @@
-"""The report of a trial: a card per subject, for the terminal and as a dictionary."""
+"""The report of a run, with one card per subject, as text and as a dictionary."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ def significance(tests: int) -> float:
 
 @dataclasses.dataclass
 class Report:
-    """The report of a trial.
+    """The report of a run of `gonio verify`.
 
     cards      the verdicts on each subject
     seed       seed of all random numbers
     effort     name of the effort, "quick", "default" or "deep"
     tests      number of statistical tests in the whole report
     threshold  p-value below which a test rejects, by Sidak's correction
-    seconds    duration of the trial
-    mended     failures of the baseline that no longer occur, as text
-    unread     shaders that could not be read, if others were tested
+    seconds    duration of the run
+    mended     failures listed in the baseline that no longer occur, as text
+    unread     shaders that could not be read, although other targets were tested
     """
 
     cards: list[Card]
@@ -54,8 +54,8 @@ class Report:
 
     @property
     def exit_code(self) -> int:
-        """The exit code: 0 if nothing fails, 1 if something fails, 4 if every failure is invisible in pictures, 2 if
-        something could not be read."""
+        """The exit code: 0 if no law fails, 4 if every failure is invisible in pictures, 1 for other failures, and 2 if
+        a shader could not be read."""
         if self.unread or self.passed:
             return InputError.code if self.unread else 0
         return 4 if all(verdict.grade is Grade.INVISIBLE for verdict in self.failures) else 1
@@ -71,7 +71,7 @@ class Report:
         return list(dict.fromkeys(verdict.law for verdict in verdicts if verdict.status == NOT_TRIED))
 
     def __getitem__(self, law: str) -> Verdict:
-        """The first failing verdict of a law, by its name, else its first verdict."""
+        """The first failing verdict on the law with this name or, if none fails, the first verdict."""
         verdicts = [card[law] for card in self.cards]
         return next((verdict for verdict in verdicts if verdict.failed), verdicts[0])
 
@@ -117,7 +117,7 @@ class Report:
         console.print(f"{word}  [dim]{self.effort}, seed {self.seed}, {asked}, {self.seconds:.1f} s[/]")
 
     def _holding(self) -> str:
-        """ "all laws hold", or the laws that hold if not all were tested; and those that are violated as declared."""
+        """ "all laws hold" or, if not all were tested, the laws that hold; also the laws violated as declared."""
         statuses = [(verdict.law, verdict.status) for card in self.cards for verdict in card.verdicts]
         judged = dict.fromkeys(law for law, _ in statuses)
         declared = dict.fromkeys(law for law, status in statuses if status == DECLARED)

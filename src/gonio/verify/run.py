@@ -1,4 +1,4 @@
-"""A trial: the test of every law on every subject, independent of the results of other laws."""
+"""A run of `gonio verify`: every law is tested on every subject, independently of the results of other laws."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from .subject import Fault, Subject
 from .verdict import DECLARED, FAIL, NOT_APPLICABLE, NOT_TRIED, PASS, Card, DoesNotApply, Finding, Verdict
 
 DEFAULT_SEED = 1
-# steps of a trial besides the laws
+# steps of a run other than the laws
 PLACES, QUALITY = "other values", "sampling quality"
-GUIDES = 2  # other values at which the laws of sampling test a guide: each takes seconds
+GUIDES = 2  # other values at which laws that test sampling are applied to a guide; each takes seconds
 CONFIRMATION = 0.001  # p-value with a second seed below which a rejection is confirmed
 Target: TypeAlias = "MaterialLike | Subject"
 Begin = Callable[[str], None]
@@ -65,21 +65,22 @@ def verify(
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
     target    anything that `go.material` accepts, the name of a target as for `gonio verify`, or a list of these
-    vary      for a target's name, values of a parameter, each with a card: "alpha=0.01..1" (five) or "alpha=0.1,0.5"
+    vary      for a target given by name, values of one parameter, "alpha=0.01..1" (five) or "alpha=0.1,0.5"; there is
+              one card per value
     quick     whether to run only a fast first check; `deep` uses more samples, directions and widths
     seed      seed of all random numbers, 1 if None; the same seed gives the same report
     law       name of a law, or a list of names; None selects all laws
     output    folder for report.html and report.json
-    junit     file for JUnit's XML; `sarif` one for SARIF
-    baseline  file of known failures, which do not fail the report; `write_baseline` writes the failures of this one
-    tolerate  "invisible", "small" or "visible": failures of this grade and below do not fail the report
+    junit     file for output as JUnit XML; `sarif` is a file for output as SARIF
+    baseline  file of known failures, which do not fail the report; the failures are written to `write_baseline`
+    tolerate  "invisible", "small" or "visible": failures of this or a less severe grade do not fail the report
     progress  called with the number of completed steps, the number of all steps, and the name of the next step
-    isolated  whether each BSDF is tested in a process of its own, which it may crash; None: if it is given by name
-    workers   number of such processes at a time, on which the results do not depend
+    isolated  whether each BSDF is tested in a separate process, in case it crashes; None: only if it is given by name
+    workers   number of such processes that run at a time; the results do not depend on it
     timeout   seconds per law in such a process; None means 300
     memory    GB per process; None means half of the machine's memory for all processes together
-    Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; `print` shows the table of the terminal.
-    Raises InputError for unknown laws and targets. An error inside a BSDF fails the law and is not raised.
+    Returns a Report with `.passed`, `["reciprocity"]` and `.as_dict()`; `print` shows it as in the terminal.
+    Raises InputError for unknown laws and targets. An error inside a BSDF is not raised; it fails the law.
     """
     seed = DEFAULT_SEED if seed is None else seed
     if seed < 0:
@@ -129,7 +130,7 @@ def _isolable(targets: Sequence[BSDF | Subject | str]) -> bool:
 def _here(
     subjects: list[Subject], laws: list[Law], effort: str, seed: int, progress: Callable[[int, int, str], None] | None
 ) -> Report:
-    """Run the trial in this process."""
+    """Test the subjects in this process."""
     started = time.perf_counter()
     steps, done = len(subjects) * len(laws), 0
     results = []
@@ -223,7 +224,7 @@ def judged(
 
 
 class Asked(NamedTuple):
-    """The result of a law for a subject at one place, and the seconds that it took."""
+    """The result of a law for a subject at one place, and the time taken in seconds."""
 
     place: Place
     what: Finding | Verdict
@@ -231,8 +232,8 @@ class Asked(NamedTuple):
 
 
 def _preliminary(all_: list[Asked], declared: bool) -> str:
-    """A law's result at all places as text, before its statistical tests are decided, since their threshold depends on
-    all laws.
+    """A law's result at all places as text, before its statistical tests are evaluated: their threshold depends on all
+    laws.
 
     declared  whether a violation of the law is declared; the verdict then compares its size
     """
@@ -252,10 +253,10 @@ def _preliminary(all_: list[Asked], declared: bool) -> str:
 
 
 def _places(one: Subject, effort: str, seed: int) -> list[Place]:
-    """The other parameter values at which to test; none if the BSDF fails while they are chosen, which the laws then
-    report."""
+    """The other parameter values at which to test; none if the BSDF fails while they are being chosen. The laws then
+    report the failure."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", GonioWarning)  # the ends of the ranges are chosen on purpose
+        warnings.simplefilter("ignore", GonioWarning)  # values at the ends of the ranges are intended
         try:
             return box.places(one, EFFORTS[effort], seed)
         except Fault:
@@ -289,7 +290,7 @@ def _verdict(law: Law, asked: Asked, threshold: float, seed: int) -> Verdict:
 
 
 def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[Verdict, Asked]:
-    """The verdict over all places, and the result from which it follows: that at the given values, unless the law holds
+    """The verdict over all places, and the result on which it is based: that at the given values, unless the law holds
     there and fails elsewhere. After three failures, the remaining places are skipped."""
     first = _verdict(law, all_[0], threshold, seed)
     answer, where = first, all_[0]
@@ -316,7 +317,7 @@ def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdi
     """The finding of a law. An error inside the BSDF is a failure of this law only."""
     try:
         with warnings.catch_warnings(), limited(law.name):
-            warnings.simplefilter("ignore", GonioWarning)  # variants use the ends of the ranges on purpose
+            warnings.simplefilter("ignore", GonioWarning)  # values at the ends of the ranges are intended
             return law.judge(one, effort, seed)
     except DoesNotApply as reason:
         return _failed(law, one, str(reason), NOT_APPLICABLE)
@@ -342,9 +343,9 @@ def decide(
             break  # three confirmed rejections are enough
         trial.second = trial.repeat()
         if trial.second < CONFIRMATION:
-            statistical.append(f"{trial.where}: p = {trial.p:.2g}, and {trial.second:.2g} with a second seed")
+            statistical.append(f"{trial.where}: p = {trial.p:.2g}, and p = {trial.second:.2g} with a second seed")
         else:
-            text = f"{trial.where}: p = {trial.p:.2g} was due to chance ({trial.second:.2g} with a second seed)"
+            text = f"{trial.where}: p = {trial.p:.2g} was due to chance (p = {trial.second:.2g} with a second seed)"
             finding.notes.append(text)
     over = not finding.figure <= finding.tolerance
     status = FAIL if why or statistical or over else PASS
@@ -358,9 +359,10 @@ def decide(
                 status, why = (FAIL, ["a violation is declared, but the law holds: " + breach.reason])
         elif size <= breach.size * (1.0 + 1e-6) + finding.tolerance:
             status = DECLARED
-            finding.notes.insert(0, f"declared violation: {breach.reason} (at most {breach.size:.4g})")
+            bound = "no declared bound" if breach.size == float("inf") else f"declared bound: {breach.size:.4g}"
+            finding.notes.insert(0, f"declared violation: {breach.reason}; {bound}")
         else:
-            why.append(f"the violation of {size:.4g} exceeds the declared {breach.size:.4g}: {breach.reason}")
+            why.append(f"the violation of {size:.4g} exceeds the declared bound of {breach.size:.4g}: {breach.reason}")
     elif over:
         why += _exceeds(finding, law.name in getattr(one.model, "known_violations", {}))
     why += statistical

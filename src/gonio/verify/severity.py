@@ -33,7 +33,7 @@ class Grade(enum.StrEnum):
     """The severity of a failure. `LIMITS` contains the limits for the average and for the worst direction.
 
     NAN, NOISE, FITTING and INTERFACE (a call that integrators do not make, or whose result they ignore) do not bias a
-    picture. BY_NATURE and INNER mean that the defect is not one of this material: it follows from the kind of material,
+    picture. BY_NATURE and INNER mean that this material is not at fault: the failure follows from the kind of material,
     or is that of an inner material.
     """
 
@@ -64,7 +64,7 @@ class Bias:
     share    fraction of this hemisphere in which the bias exceeds 1 %
     where    the worst wo, or another description of the place
     kind     "bias"; "lost" or "gained" energy; "nan", with fractions of directions instead of light; "noise", which
-             costs samples but does not bias; "derivatives", which affects fitting only; "interface", which affects only
+             wastes samples without bias; "derivatives", which affects fitting only; "interface", which affects only
              callers of the methods that `where` names
     furnace  average under uniform light, where errors of opposite sign cancel; None if sampling is not affected
     both     average with light and BSDF samples combined; None if sampling is not affected
@@ -89,9 +89,9 @@ class Bias:
 
     @property
     def words(self) -> str:
-        """The bias as text: "loses 4.8 % of the reflected light on average, 12 % at worst (wo at 85 degrees), ..."."""
+        """The bias as text: "a loss of 4.8 % of the reflected light on average, 12 % at worst (wo at 85 degrees)"."""
         if self.kind == "noise":
-            return f"wastes samples without bias: {self.where}"
+            return f"wasted samples, but no bias: {self.where}"
         if self.kind == "interface":
             return f"pictures of a plain path tracer are correct; {self.where}"
         if self.kind == "derivatives" and not self.average:
@@ -102,18 +102,18 @@ class Bias:
             )
         if self.kind == "nan":
             if not self.worst:
-                return f"NaN at isolated directions only: {self.where}"
+                return f"NaN only at isolated directions: {self.where}"
             text = f"values are negative or not finite for {percent(self.average)} of all pairs of directions"
             return f"{text}, {percent(self.worst)} at worst ({self.where})"
-        verb = {"lost": "loses", "gained": "gains", "bias": "is wrong by"}[self.kind]
-        text = f"{verb} {percent(self.average)} of the reflected light on average, {percent(self.worst)} at worst"
+        name = {"lost": "a loss", "gained": "a gain", "bias": "an error"}[self.kind]
+        text = f"{name} of {percent(self.average)} of the reflected light on average, {percent(self.worst)} at worst"
         text += f" ({self.where})"
         if self.share:
-            text += f", more than 1 % for {percent(self.share)} of directions wo"
+            text += f"; more than 1 % for {percent(self.share)} of the directions wo"
         if self.furnace is not None and self.furnace < 0.9 * self.average:
-            text += f"; {percent(self.furnace)} under uniform light"
+            text += f"; {percent(self.furnace)} on average under uniform light"
         if self.both is not None and abs(self.both - self.average) > 0.1 * self.average:
-            text += f"; {percent(self.both)} with light and BSDF sampling combined"
+            text += f"; {percent(self.both)} on average with light and BSDF sampling combined"
         return text
 
 
@@ -175,7 +175,7 @@ def summed(
 
 
 def between(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
-    """The bias of a value relative to another value to which it should be equal: int |a - b| dwi / int |a| dwi.
+    """The bias of a value b relative to a value a to which it should be equal: int |a - b| dwi / int |a| dwi.
 
     pair   function (wo, wi) that returns the two values, a and b
     where  text to append to the description of the worst wo
@@ -195,8 +195,8 @@ def between(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
 
 
 def by_samples(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
-    """As `between`, with the same arguments, but by Monte Carlo integration with half of the directions uniform, for
-    differences that are too irregular for cells."""
+    """The same as `between`, with the same arguments, but by Monte Carlo integration with half of the directions
+    uniform, for differences that are too irregular for cells."""
     if subject.stochastic or not subject.steady:
         return None
     wo, mass = views(subject.sides)
@@ -213,8 +213,8 @@ def by_samples(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
 
 
 def seeds(subject: Subject) -> cubature.Sampler:
-    """A sampler by which the cubature places its cells: that of the subject, where samples that are not unit vectors
-    fail."""
+    """The sampler from which the cubature places its cells: that of the subject, except that samples that are not unit
+    vectors count as failed."""
 
     def sample(wo: np.ndarray, u: np.ndarray) -> object:
         s = subject.sample(wo, u, precision="float32")

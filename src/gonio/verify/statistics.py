@@ -1,6 +1,7 @@
 """Tail probabilities for the statistical tests.
 
-`scipy.special` has these functions too, but takes 0.4 s to import, a tenth of a quick trial; tests compare with it.
+`scipy.special` has these functions too, but takes 0.4 s to import, a tenth of the time of a quick run. Tests
+compare the two.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ STEPS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
 
 def is_power_series(rows: np.ndarray, noise: float, first_power: bool = True) -> bool:
     """Whether values are a power series in an albedo without negative coefficients, as for light that is reflected
-    once, twice, and so on. A color that is gamma-decoded, or multiplied twice, has no first power.
+    once, twice, and so on. A color that is gamma-decoded, or multiplied twice, gives a series without a first power.
 
     rows         values at the albedos STEPS, (7, N)
     noise        relative noise of the values

@@ -1,8 +1,8 @@
-"""A subject, a BSDF under test: its protocol, and the facts that it declares about itself.
+"""A subject: a BSDF under test, with its protocol and its declared properties.
 
 A subject evaluates `eval`, `pdf` and `sample` on NumPy arrays, in the precisions that the BSDF supports, and provides a
-copy bound for Dr.Jit arrays. An exception inside the BSDF, or a result of the wrong shape, becomes a `Fault` that names
-the line. Nothing in this module depends on the material.
+copy of the model that is bound to Dr.Jit arrays. An exception inside the BSDF, or a result of the wrong shape, becomes
+a `Fault` that states the line. Nothing in this module depends on a particular material.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .isolation import watch
 
 
 class Fault(Exception):
-    """A failure of the BSDF itself: an exception inside it, or an invalid result."""
+    """A failure of the BSDF: an exception that it raises, or an invalid result."""
 
     def __init__(self, what: str, location: str = "") -> None:
         super().__init__(f"{what} ({location})" if location else what)
@@ -43,8 +43,8 @@ class Subject:
     model     the material or plugin
     target    its name, such as "conductor", "glass.py:Glass" or "mitsuba:plastic"
     settings  the parameters that were set, by name, for titles and commands
-    drawn_by  the subject whose samples show where light is, if computing a guide of its own would take seconds; else
-              None
+    drawn_by  another subject whose samples are used to locate the lobes, if computing this subject's own guide would
+              take seconds; else None
     memo      cache of values that are expensive to compute, such as those of `estimators`
     """
 
@@ -73,17 +73,18 @@ class Subject:
 
     @property
     def perturbs_normal(self) -> bool:
-        """Whether its normal may differ from that of the surface."""
+        """Whether its shading normal may differ from the surface normal."""
         return bool(self.model.perturbs_normal)
 
     @functools.cached_property
     def guided(self) -> bool:
-        """Whether it, or an inner material, defines only `eval` and is sampled by a guide computed from it."""
+        """Whether it or an inner material defines only `eval`, and is sampled with a guide: a density tabulated from
+        `eval`."""
         return isinstance(self.model, BSDF) and any(one.guided for _, one in tree.walk(self.model))
 
     @property
     def sampler(self) -> Subject:
-        """The subject whose samples show where its light is."""
+        """The subject whose samples are used to locate the lobes: `drawn_by` or, if it is None, this subject."""
         return self.drawn_by or self
 
     @property
@@ -93,12 +94,12 @@ class Subject:
 
     @property
     def zero_weight_is_failure(self) -> bool:
-        """Whether a sample of weight 0 counts as failed, since Mitsuba's plugins signal failures only in this way."""
+        """Whether a sample of weight 0 counts as failed, because this is how Mitsuba's plugins mark failed samples."""
         return bool(getattr(self.model, "zero_weight_is_failure", False))
 
     @property
     def precisions(self) -> tuple[Precision, ...]:
-        """The precisions in which it can be evaluated, the most precise last."""
+        """The precisions in which it can be evaluated, in increasing order."""
         return tuple(getattr(self.model, "precisions", backend.PRECISIONS))
 
     @property
@@ -111,12 +112,12 @@ class Subject:
 
     @property
     def breaches(self) -> dict[str, KnownViolation]:
-        """The violations that it declares, by the names of the laws."""
+        """The declared violations, by the names of the laws."""
         return self.model.violations()
 
     @property
     def by_nature(self) -> Mapping[str, str]:
-        """The laws that this kind of material violates by nature, with the reasons."""
+        """The laws that this kind of material inherently violates, with the reasons."""
         return getattr(self.model, "by_nature", {})
 
     @property
@@ -124,7 +125,7 @@ class Subject:
         """The inner materials, each as a subject."""
         held = getattr(self.model, "held", None)
         children = held if held is not None else tree.children(self.model) if isinstance(self.model, BSDF) else {}
-        return [Subject(inner, f"{self.target}'s {name}") for name, inner in children.items()]
+        return [Subject(inner, f"the inner material `{name}` of {self.target}") for name, inner in children.items()]
 
     def with_sound_inside(self) -> Subject:
         """The same BSDF with diffuse inner materials, which violate no law."""
@@ -133,12 +134,12 @@ class Subject:
         return self.with_inside(models()["lambert"]())
 
     def with_inside(self, material: BSDF) -> Subject:
-        """The same material with another one in place of each inner material."""
+        """The same material, with each inner material replaced by another one."""
         return Subject(tree.replace(self.model, dict.fromkeys(tree.children(self.model), material)), self.target)
 
     @functools.cached_property
     def sides(self) -> tuple[int, ...]:
-        """The sides of the surface from which it reflects or transmits, 1 above and -1 below; () if it is black."""
+        """The sides of the surface from which light is reflected or transmitted: 1 above, -1 below; () if black."""
         rng = np.random.default_rng(5)
         sides = []
         for side in (1, -1):
@@ -147,7 +148,7 @@ class Subject:
             if np.any(self.eval(wo, wi, precision="float32") > 0.0):
                 sides.append(side)
                 continue
-            with contextlib.suppress(Fault):  # the laws of sampling report a `sample` that fails
+            with contextlib.suppress(Fault):  # the laws that test sampling report it
                 if np.any(self.sampler.sample(wo, directions.numbers(rng, 512), precision="float32").weight > 0.0):
                     sides.append(side)
         return tuple(sides)
@@ -161,14 +162,14 @@ class Subject:
             return True
         try:
             drawn = self.sample(wo, directions.numbers(rng, 2048), precision="float32")
-        except Fault:  # the laws of sampling report it
+        except Fault:  # the laws that test sampling report it
             return True
         return bool(np.any((drawn.pdf > 0.0) & ~drawn.delta))
 
     @functools.cached_property
     def steady(self) -> bool:
-        """Whether repeated calls of `eval` and `sample` give the same results, and those of `eval` also with fewer
-        pairs."""
+        """Whether repeated calls of `eval` and `sample` give the same results, and whether those of `eval` are also the
+        same for fewer pairs."""
         rng = np.random.default_rng(7)
         wo, wi = (directions.single(directions.uniform(rng, 512)) for _ in range(2))
         first = self.eval(wo, wi)
@@ -198,7 +199,7 @@ class Subject:
         """The command line that tests this BSDF, with additional arguments `more`."""
         parts = ["gonio", "verify", self.target]
         for name, value in self.settings.items():
-            # a file of the user's relative to the current folder
+            # the user's files relative to the current folder
             text = notation.setting(self.model, name, value).removeprefix(f"{Path.cwd()}{os.sep}")
             parts += ["--param", f"{name}={text}"]
         return " ".join(part if part == "verify" else shlex.quote(part) for part in [*parts, *more])
@@ -208,26 +209,26 @@ class Subject:
     def eval(
         self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: Precision | None = None
     ) -> np.ndarray:
-        """f |cos theta_i| for wo and wi, (N, 3) each: (N, channels), float64.
+        """f |cos theta_i| for directions wo and wi, (N, 3) each. Returns (N, channels), float64.
 
         mode       as in `BSDF.eval`
-        precision  precision of the evaluation; None for the best
+        precision  precision of the evaluation; None for the highest
         """
         value = self._call("eval", wo, wi, mode=mode, precision=precision or self.best)
         return self._shaped("eval", value, len(wo), 2)
 
     def pdf(self, wo: np.ndarray, wi: np.ndarray, precision: Precision | None = None) -> np.ndarray:
-        """Density with which `sample` chooses wi, 1/sr, (N,), float64. Arguments as for `eval`."""
+        """Density with which `sample` chooses wi, 1/sr, (N,), float64. For the arguments, see `eval`."""
         value = self._call("pdf", wo, wi, precision=precision or self.best)
         return self._shaped("pdf", value, len(wo), 1)
 
     def sample(
         self, wo: np.ndarray, u: np.ndarray, mode: str = "radiance", precision: Precision | None = None
     ) -> SampleArrays:
-        """A `Sample` with arrays of float64 and bool. `wo` and `u` are (N, 3) each; other arguments as for `eval`."""
+        """A `Sample` of float64 and bool arrays. `wo` and `u` are (N, 3) each; for other arguments, see `eval`."""
         s = self._call("sample", wo, u, mode=mode, precision=precision or self.best)
         if not isinstance(s, tuple) or len(s) != 5:
-            raise Fault(f"sample returned {type(s).__name__}, a Sample expected", _place(self.model, "sample"))
+            raise Fault(f"sample returned {type(s).__name__} instead of a Sample", _place(self.model, "sample"))
         n = len(wo)
         return Sample(
             self._shaped("sample: wi", s[0], n, 2),
@@ -240,7 +241,7 @@ class Subject:
     def f(
         self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: Precision | None = None
     ) -> np.ndarray:
-        """The BSDF without the cosine, 1/sr; 0 for cos theta_i = 0. Arguments as for `eval`."""
+        """The BSDF without the cosine, 1/sr; 0 for cos theta_i = 0. For the arguments, see `eval`."""
         value = self.eval(wo, wi, mode, precision)
         cos = np.abs(wi[:, 2:])
         return np.divide(value, cos, out=np.zeros_like(value), where=cos > 0.0)
@@ -252,7 +253,7 @@ class Subject:
         return self.model
 
     def power(self) -> Callable[[Direction, Direction], Spectrum]:
-        """`eval` for power (mode "importance") as a function of 64-bit Dr.Jit vectors, in the best precision."""
+        """`eval` for power (mode "importance") in the highest precision, as a function of float64 Dr.Jit vectors."""
         own, exact = backend.types(self.best), backend.types("float64")
         model = self.bound(self.best)
         # without transmission the two modes are equal, and one kernel is enough
@@ -279,11 +280,11 @@ class Subject:
         fault = ""
         if array.dtype.kind not in "fiu" or array.ndim != dimensions or (array.ndim and array.shape[0] != count):
             expected = f"({count},)" if dimensions == 1 else f"({count}, channels)"
-            fault = f"shape {array.shape}, {expected} expected"
+            fault = f"shape {array.shape} instead of {expected}"
         elif what in ("eval", "sample: weight") and array.shape[1] not in (1, 3, 4):
-            fault = f"{array.shape[1]} channels, those of a spectrum expected"
+            fault = f"{array.shape[1]} channels instead of 1, 3 or 4"
         elif what == "sample: wi" and array.shape[1] != 3:
-            fault = f"{array.shape[1]} components, 3 expected"
+            fault = f"{array.shape[1]} components instead of 3"
         if fault:
             raise Fault(f"{what} returned {fault}", _place(self.model, what.split(":")[0]))
         return array.astype(np.float64)
@@ -306,7 +307,7 @@ class Described(Subject):
 
 
 def guarded(model: Any, method: str, run: Any) -> Any:
-    """The result of calling `run`. An exception inside the model becomes a Fault that names its line.
+    """The result of calling `run`. An exception inside the model becomes a Fault that states its line.
 
     method  name of the method that is called
     """
@@ -321,8 +322,9 @@ def guarded(model: Any, method: str, run: Any) -> Any:
             raise Fault(f"{error.what} in {method}", error.where) from raised
         text = str(error).strip().splitlines()
         if text and "implicit conversion to 'bool'" in text[0]:
-            what = f"Python's `if`, `and`, `or` or `not` on the values of many rays in {method}"
-            raise Fault(f"{what}: write `ops.where(condition, a, b)`, `&`, `|`, `~`", _line(model, error)) from raised
+            what = f"Python's `if`, `and`, `or` or `not` was applied to the values of many rays in {method}"
+            hint = "use `ops.where(condition, a, b)`, `&`, `|` or `~`"
+            raise Fault(f"{what}; {hint}", _line(model, error)) from raised
         raise Fault(f"{type(error).__name__} in {method}: {text[0] if text else ''}", _line(model, error)) from raised
 
 

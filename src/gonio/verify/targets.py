@@ -3,7 +3,7 @@
 conductor                the name of a model; inner materials are also given by name: --param a=lambert
 glass.py:Glass           a class in a Python file, which is executed because the user named it
 glass.py:my_glass        a Mitsuba plugin that the file registers, by that name or by its class
-mitsuba:roughplastic     a plugin of Mitsuba, or one in a folder of GONIO_PLUGINS, with its properties as parameters,
+mitsuba:roughplastic     a plugin of Mitsuba, or one in a folder listed in GONIO_PLUGINS; its properties are parameters,
                          which may also be set in the name: mitsuba:roughplastic(alpha=0.3)
 plastic.xml, .json       a Mitsuba description; also as a string: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL format
@@ -31,9 +31,9 @@ def resolve(target: str, settings: Sequence[str] = (), vary: str = "") -> list[S
 
     target    a string in one of the forms above
     settings  values of parameters, each "name=value"
-    vary      values of the parameter that varies: "name=low..high" (five values, in geometric progression if high / low
-              is ten or more), or "name=v1,v2,..."; "" for none
-    Raises InputError for unknown names, with the most similar known one.
+    vary      values of one parameter: "name=low..high" (five values, in geometric progression if high / low is ten or
+              more) or "name=v1,v2,..."; "" for none
+    Raises InputError for unknown names; the error suggests the most similar known name.
     """
     given = dict(map(notation.assignment, settings))
     if not vary:

@@ -1,4 +1,4 @@
-"""Print a card as a table on the terminal, and the values for one pair of directions."""
+"""Print a report card as a table in the terminal, or the values for one pair of directions."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""A trial in parts, one per target. Each part is stored when it is done, and other processes or machines may compute
-it.
+"""A run in parts, one per target. Each part is stored when it is complete, and may be computed by another process or
+machine.
 
 The threshold of a statistical test depends on the number of tests in the whole report, which is known only at the end.
-A part is therefore decided first by the number of its own tests, and again if the final number makes a difference.
+A part is therefore evaluated first with the number of its own tests, and again if the final number changes a verdict.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ def trial(
     memory: float | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """As `child.trial`, with the same arguments, but computed by the current executor of parts."""
-    # Several local processes split the targets themselves; quick trials end before anything could be lost.
+    """The same as `child.trial`, with the same arguments, but computed by the current executor of parts."""
+    # Several local processes divide the targets themselves; quick runs are too short to be worth storing.
     if not executor.current().remote and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
         return child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     began = time.perf_counter()
@@ -49,7 +49,7 @@ def trial(
     hashes = {name: facts.file_hash(path) for name, path in names.items()}
     with parts.job("verify", task, sorted(hashes.items()), facts.code()) as job:
         if job.found and progress:
-            progress(0, len(task.items), f"resuming a trial; {job.found} parts are done")
+            progress(0, len(task.items), f"resuming a run; {job.found} parts are complete")
         judged = _judged(task, range(len(task.items)), None, limit, memory, hashes, progress)
         tests = sum(len(card.p_values) for cards in judged.values() for card in _cards(cards))
         threshold = significance(tests)
@@ -89,7 +89,7 @@ def _judged(
     judged: dict[int, list[Card | Unread]] = {}
     for index, arrays in executor.each(part, arguments, keys, files):
         if index >= 0:
-            # trusted: from the user's own folder, or from a worker that executes whatever it receives anyway
+            # trusted: from the user's own folder, or from a worker that executes any code that it receives
             judged[numbers[index]] = pickle.loads(arrays["cards"].tobytes())
             if progress:
                 target = task.items[numbers[index]].target

@@ -1,6 +1,6 @@
 """The findings of laws on a subject, and the verdicts and cards derived from them.
 
-A law returns a `Finding`: a measured value, and the p-values of its statistical tests. `gonio.verify.run` decides the
+A law returns a `Finding`: a measured value, and the p-values of its statistical tests. `gonio.verify.run` evaluates the
 tests when their number in the whole report is known.
 """
 
@@ -20,13 +20,13 @@ from .severity import Bias, Grade
 from .subject import Subject
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = ("pass", "fail", "breaks as declared", "does not apply")
-KNOWN = "known"  # failed already when the baseline was written
-NOT_TRIED = "not tried"  # something that the law needs is not installed here
-TOLERATED = "tolerated"  # fails, but no more than the user tolerates in pictures
+KNOWN = "known"  # a failure that the baseline already contains
+NOT_TRIED = "not tried"  # a program or package that the law needs is not installed
+TOLERATED = "tolerated"  # a failure whose effect on pictures the user tolerates
 
 
 class Evidence(Protocol):
-    """The observations of a law, of which the report shows a figure."""
+    """The data of a law from which the report draws a figure."""
 
     def draw(self) -> tuple[str, str]:
         """Draw the figure; returns its SVG and its caption."""
@@ -55,17 +55,17 @@ class Finding:
     figure     measured size of the violation, which is compared with `tolerance`
     tolerance  largest size that passes
     reason     justification of the tolerance
-    shown      the size as text, if a number alone is unclear
+    shown      the size as text, if a number alone would be unclear
     allowed    the tolerance in the unit of `shown`
     worst      description of the worst case
     at         pair of directions of the worst case, for the command that repeats it
     settings   parameter values of the worst case, if they differ from the given ones
     trials     statistical tests
     problems   violations that fail the law regardless of the size
-    untried    the reason why part of the law could not be tested, so that it cannot pass; "" if all was tested
+    untried    the reason why part of the law could not be tested, in which case it cannot pass; "" otherwise
     notes      further information
-    breach     size to compare with a declared violation, if it is not `figure`
-    known      the declared violation of the tested variant, such as the lossless one, if it is not that of the subject
+    breach     size to compare with a declared violation, if it differs from `figure`
+    known      the declared violation of the tested variant, such as the lossless one, if it differs from the subject's
     evidence   data for the figure in the report
     details    data for the methods `bias` and `ratios` of the law
     """
@@ -101,11 +101,11 @@ class Verdict:
     p        smallest p-value of its statistical tests; None if there are none
     command  command line that repeats the test
     why      the reasons for a failure
-    seconds  time that the law took
+    seconds  time taken by the law
     places   number of parameter settings at which the law was tested, including the given one
-    bias     for a failure or a declared violation, its effect on a picture; None if unknown
+    bias     effect of a failure or a declared violation on a picture; None if unknown
     grade    severity of that effect; None if unknown
-    cause    for a failure, the probable mistake; "" if none is clear
+    cause    probable cause of a failure; "" if unknown
     reproduction  for a failure of a Mitsuba plugin, a program that reproduces it without Gonio
     """
 
@@ -137,8 +137,8 @@ class Verdict:
 
     @property
     def cause_in_words(self) -> str:
-        """The probable mistake that caused a failure, or the statement that it was not found."""
-        unknown = self.failed and self.figure is not None  # an exception explains itself
+        """The probable cause of a failure, or the statement that it is unknown."""
+        unknown = self.failed and self.figure is not None  # an exception needs no explanation
         return self.cause or ("unknown; none of the known mistakes matches" if unknown else "")
 
     @property
@@ -153,7 +153,7 @@ class Verdict:
 
 
 class Unread(NamedTuple):
-    """One of several targets that could not be read and hence was not tested.
+    """One of several targets that could not be read and was therefore not tested.
 
     target             its name
     what, where, hint  the error: its message, its place (file and line), and a suggestion
@@ -175,7 +175,7 @@ class Card:
     """All verdicts on one subject.
 
     covered    description of the parameter values at which it was tested
-    notes      observations on its behavior, such as printed output or the end of its process
+    notes      remarks on its behavior, such as printed output or a crash of its process
     quality    quality of its sampling; None if it could not be measured
     p_values   p-values of its statistical tests
     threshold  p-value below which a test rejected

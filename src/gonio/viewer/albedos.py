@@ -1,4 +1,4 @@
-"""`go.albedo`, for everything that `go.material` takes."""
+"""`go.albedo`, for everything that `go.material` accepts."""
 
 from __future__ import annotations
 
@@ -23,5 +23,5 @@ def albedo(
 
 
 albedo.__doc__ = (directional.albedo.__doc__ or "").replace(
-    "    mu       cosine", "    model    anything that `go.material` takes\n    mu       cosine", 1
+    "    mu       cosine", "    model    anything that `go.material` accepts\n    mu       cosine", 1
 )

@@ -1,4 +1,4 @@
-"""The figure of a capture: photographs, the classification of their pixels, the fit to them, and its uncertainty."""
+"""The figure of a capture: a photograph, the classification of its pixels, the fit, and the uncertainty."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Floats = NDArray[np.float64]
-COLORS = ("#d9dee4", "#4d9a6a", "#c8354a", "#39465a", "#e0a030")  # outside the sample, then one per fate
+COLORS = ("#d9dee4", "#4d9a6a", "#c8354a", "#39465a", "#e0a030")  # outside the sample, then one per class of pixels
 MAX_PERCENT = 50.0  # upper limit of the scales of differences and of errors
 
 
 def draw(capture: Capture) -> Drawing:
-    """The first photograph of a sample, the fit to it, their difference, and the classification of its pixels; also the
-    values and standard errors of the samples as functions of theta_h and theta_d, gray where there are no samples."""
+    """Draw the first photograph of a sample, the fit to it, the difference between the two, and the classification of
+    the pixels; also the values and standard errors of the samples as functions of theta_h and theta_d, gray where there
+    are no samples."""
     matplotlib = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
@@ -56,7 +57,7 @@ def _rounded(text: str) -> str:
 
 
 def _compare(axes: list[Axes], capture: Capture, shot: Photograph) -> None:
-    """The photograph, the fit to it, and the difference."""
+    """Draw the photograph, the fit to it, and their difference."""
     fitted = capture.fitted
     assert fitted is not None, "the caller has checked it"
     lamp = capture.scene.names.index(shot.shot.light)
@@ -89,7 +90,7 @@ def _photograph(axis: Axes, shot: Photograph, title: str) -> None:
 
 
 def _picture(axis: Axes, radiance: Floats, white: float, title: str) -> None:
-    """Linear radiance encoded as sRGB; light gray where there is no value."""
+    """Draw linear radiance, encoded as sRGB; pixels without a value are light gray."""
     shown = np.clip(np.nan_to_num(radiance / white, nan=0.8), 0.0, 1.0) ** (1.0 / 2.2)
     axis.imshow(shown, interpolation="nearest")
     axis.set_title(title, fontsize=12)
@@ -110,7 +111,7 @@ def _fates(axis: Axes, capture: Capture, shot: Photograph) -> None:
 
 
 def _values(axis: Axes, capture: Capture) -> None:
-    """Samples over theta_h and theta_d, averaged over phi_d."""
+    """Draw the samples over theta_h and theta_d, averaged over phi_d."""
     total, count = _binned(capture, capture.samples.table.values)
     with np.errstate(invalid="ignore"):
         value = total / count[..., None]
@@ -124,7 +125,7 @@ def _values(axis: Axes, capture: Capture) -> None:
 
 
 def _cube_root_bar(axis: Axes, white: float) -> None:
-    """The color scale of f. Brightness is its cube root, which shows both dark lobes and peaks."""
+    """Draw the color scale of f. Brightness is the cube root of f, so that dark lobes and peaks are both visible."""
     from matplotlib.cm import ScalarMappable
 
     steps = np.linspace(0.0, 1.0, 5)

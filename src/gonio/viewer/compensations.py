@@ -16,16 +16,17 @@ SAMPLES = 200_000
 
 @public
 def compensation(*models: MaterialLike, output: str | Path | None = None, samples: int = SAMPLES) -> dict[str, Any]:
-    """Compare methods that restore light lost by single-scattering models: furnace, error, reciprocity, cost.
+    """Compare methods that restore light lost by single-scattering models, by furnace test, error, reciprocity and
+    cost.
 
         go.compensation("mine.py:Compensation", samples=20_000)["rms"]["gold"]
 
-    models   more materials to compare: a material with a base is compared as a method, any other is used as a base
-    output   folder for a picture and JSON; None writes nothing
-    samples  random walks per point of the reference
+    models   additional materials: those with a base are compared as methods, all others are used as bases
+    output   folder for a picture and a JSON file; None writes nothing
+    samples  number of random walks per reference value
     Returns the dictionary that `gonio compensation --json` prints: `albedo` [material][method] at each `roughness` and
-    `mu`, its `rms` distance to the random walk, the largest loss in the `furnace`, the largest error of `reciprocity`,
-    and the `cost`. Raises InputError for a folder that cannot be written and for invalid materials.
+    `mu`, its `rms` error against the random walk, the largest loss in the `furnace`, the largest error of
+    `reciprocity`, and the `cost`. Raises InputError for a folder that cannot be written and for invalid materials.
     """
     folder = None if output is None else files.check_folder(Path(output))
     own = [material(model) for model in models]

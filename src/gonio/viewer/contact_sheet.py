@@ -1,7 +1,7 @@
-"""`gonio study`: one scene rendered with every combination of values, on one labeled sheet.
+"""`gonio study`: a scene rendered with every combination of values, on one labeled contact sheet.
 
-The values are set in the scene before it is validated, and kernels do not depend on them, so only the first picture
-compiles.
+The values are set in the scene before it is validated. Kernels do not depend on the values, so only the first picture
+requires compilation.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ from .variations import Variation, parse_variation, variation, with_cell
 
 __all__ = ["Sheet", "Variation", "draw", "parse_variation", "render_sheet", "study", "variation", "with_cell"]
 
-MAX_CELLS = 256  # more pictures are hard to compare, and usually the result of a typo
+MAX_CELLS = 256  # larger numbers of pictures are hard to compare, and are usually due to a typo
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """The result of a study; `cells` are the values of each picture, in the order of `itertools.product`.
+    """The result of a study. `cells` contains the values of each picture, in the order of `itertools.product`.
 
-    size      width and height of each picture, pixels
-    exposure  exposure of all pictures, stops
-    output    file that the sheet was written to, or None
+    size      width and height of each picture, in pixels
+    exposure  exposure of all pictures, in stops
+    output    file to which the sheet was written, or None
     """
 
     cells: tuple[dict[str, object], ...]
@@ -87,16 +87,16 @@ def study(
         go.study("examples/phong", {"shapes.1.material.p": [4, 16, 64]}, output="p.png")
         go.study("phong", {"p": [4, 16], ("kd", "ks"): [(0.2, 0.8), (0.5, 0.5)]})
 
-    scene     as in `go.render`; a material, as `go.material` takes it, is shown on a ball
+    scene     as in `go.render`; a material, in any form that `go.material` accepts, is shown on a ball
     vary      values by their path in the scene, by the path of a material's parameter ("base.alpha"), or by the name of
-              a parameter of a Mitsuba XML. One path gives a row, two a grid (rows by the first, columns by the second),
-              more several grids. Paths may vary together, such as values with a constant sum:
-              {("kd", "ks"): [(0.2, 0.8), ...]}, or "kd,ks"
+              a parameter of a Mitsuba XML file. One path gives a row; two paths give a grid, whose rows correspond to
+              the first path and whose columns to the second; more paths give several grids. Paths may vary together,
+              for example with a constant sum: {("kd", "ks"): [(0.2, 0.8), ...]}, or "kd,ks"
     output    file to write, .png, .pdf or .svg; None writes nothing
-    exposure  stops, the same for all pictures, or "auto"
-    title     heading of the sheet; the scene's name if not given
-    Other options are as in `go.render`. Returns a Sheet, which a notebook shows. Raises InputError for an invalid
-    scene, path, value or option, MachineError if this machine cannot render it.
+    exposure  exposure in stops, the same for all pictures, or "auto"
+    title     heading of the sheet; by default, the scene's name
+    Other options are as in `go.render`. Returns a Sheet, which a notebook displays. Raises InputError for an invalid
+    scene, path, value or option, MachineError if this machine cannot render the scene.
     """
     named = _named(scene)
     request = Request(
@@ -110,7 +110,7 @@ def study(
 
 
 def _named(scene: MaterialLike) -> notation.Settings | None:
-    """The material that is varied, None for a scene."""
+    """The material to vary; None for a scene."""
     if not isinstance(scene, str | Path):
         shown = material(scene)
         return type(shown), {name: getattr(shown, name) for name in shown.parameters()}
@@ -129,8 +129,9 @@ def render_sheet(
 ) -> Sheet:
     """Render every combination and draw the sheet. Errors are raised before rendering if possible.
 
-    named   the material that is varied, instead of a scene
-    report  called before each picture with pictures done, all pictures, and a description of the next
+    named   the material to vary, instead of a scene
+    report  called before each picture, with the number of completed pictures, the total number, and a description of
+            the next picture
     tell    called at the start with a notice about results of an earlier run
     """
     started = time.perf_counter()
@@ -142,13 +143,13 @@ def render_sheet(
     identity = _identity(with_cell(request, cells[0], named)), [(one.path, repr(one.values)) for one in variations]
     with passes.Interrupts() as interrupts, parts.job("study", *identity) as job:
         if job.found:
-            tell(f"goes on with a study that was begun: {job.found} of {len(cells)} pictures are done")
+            tell(f"resumes an interrupted study: {job.found} of {len(cells)} pictures are complete")
         together = 2 * executor.current().size if executor.current().remote else 1  # keeps every worker busy
         for start in range(0, len(cells), together):
             some = cells[start : start + together]
             state = f"{start + len(some)}/{len(cells)}  " + ", ".join(map(figures.show_value, some[-1].values()))
             report(start, len(cells), state)
-            # All pictures have the same seed, so that they differ by the parameter, not by the noise.
+            # All pictures have the same seed, so that they differ in the parameter, not in the noise.
             prepared = [prepare(with_cell(request, cell, named)) for cell in some]
             notices |= dict.fromkeys(text for one in prepared for text in one.warnings)
             pictures += _pictures(prepared, job, interrupts)
@@ -161,15 +162,15 @@ def render_sheet(
         heading = encodable(title or _scene_name(request.scene))
         subtitle = f"{width}×{height}, {last.spp} samples per pixel, {last.settings['integrator']}"  # noqa: RUF001
         drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
-        if output is not None:  # inside, so that the pictures remain stored if writing fails
+        if output is not None:  # inside the `with` block, so that the pictures remain stored if writing fails
             drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
     return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)
 
 
 def cells_of(variations: Sequence[Variation]) -> tuple[dict[str, object], ...]:
-    """The values of each picture, in the order of `itertools.product`. Raises InputError if there are none, or too many
-    for a sheet."""
+    """The values of each picture, in the order of `itertools.product`. Raises InputError if there are no values, or too
+    many for a sheet."""
     names = [path for variation in variations for path in variation.paths]
     if len(set(names)) < len(names):
         raise InputError("the same path is varied twice", "--vary", "give all its values in one --vary")
@@ -184,7 +185,8 @@ def cells_of(variations: Sequence[Variation]) -> tuple[dict[str, object], ...]:
 
 
 def _identity(request: Request) -> Sequence[object]:
-    """The identity of a study; unique for a class that only this program knows, so that no part is reused."""
+    """The identity of a study. It is unique for a class that is defined only in this program, so that no part is
+    reused."""
     try:
         return sorted(described(request).items())
     except InputError:
@@ -192,7 +194,8 @@ def _identity(request: Request) -> Sequence[object]:
 
 
 def _pictures(prepared: Sequence[Prepared], job: parts.Parts, interrupts: passes.Interrupts) -> list[exposures.RGB]:
-    """Some pictures of a study: results of an earlier run, or rendered, resuming where that run was stopped."""
+    """Some pictures of a study, taken from the results of an earlier run or rendered; an interrupted picture is
+    resumed."""
     keys = [
         parts.key_of(sorted(one.sources.identity().items()), one.spp, one.request.denoise, one.size) for one in prepared
     ]

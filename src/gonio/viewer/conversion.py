@@ -1,4 +1,4 @@
-"""`gonio convert` and `go.convert`: a picture, measured values or a material in another format."""
+"""`gonio convert` and `go.convert`: conversion of a picture, measured values or a material to another format."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class Conversion:
 
     output   the file
     summary  a one-line description
-    notices  properties that the format cannot hold, values that were clipped, and values that were not measured
-    facts    for pictures `exposure` (stops, or None); for tables `kind`, `resampled`, `error`, `size` (bytes), the
+    notices  properties that the format cannot represent, values that were clipped, and values that were not measured
+    facts    for pictures, `exposure` (stops, or None); for tables, `kind`, `resampled`, `error`, `size` (bytes), the
              components of the error, `resolution` and `reciprocity`, and `measured`, the measured angles, if the file
-             states values at others too
+             also contains values at other angles
     """
 
     output: Path
@@ -44,7 +44,7 @@ class Conversion:
 def convert(
     source: str | Path, output: str | Path, *, exposure: exposures.Exposure = 0.0, phi: int | None = None
 ) -> Conversion:
-    """Write a picture, measured values, or another program's material in the format of the output's suffix.
+    """Convert a picture, measured values, or another program's material to the format given by the output's suffix.
 
         go.convert("ball.exr", "ball.png", exposure="auto")
         go.convert("gold.binary", "gold.bsdf").facts["error"]
@@ -52,11 +52,11 @@ def convert(
     source    a picture, a file of measured values, a file that describes a material (.gltf, .mtlx, .json), or a
               material, such as "openpbr(base_metalness=1)" or "FILE.py:CLASS"
     output    the file to write
-    exposure  for a .png: stops, or "auto"
-    phi       range of phi_d in a .binary, in degrees and cells of one degree: 180, or 360, which preserves
-              nonreciprocal values; by default that of the table if it has such cells, otherwise 180
-    Warns (GonioWarning) about properties that the format cannot hold, and about values that were not measured. Raises
-    InputError for formats that cannot be read or written.
+    exposure  exposure of a .png, in stops, or "auto"
+    phi       range of phi_d in a .binary, in degrees and in cells of one degree: 180, or 360, which preserves
+              nonreciprocal values; by default, the range of the table if it has such cells, otherwise 180
+    Warns (GonioWarning) about properties that the format cannot represent, and about values that were not measured.
+    Raises InputError for formats that cannot be read or written.
     """
     result = converted(str(source), Path(output), exposure, phi)
     for notice in result.notices:
@@ -71,7 +71,7 @@ def converted(
     phi: int | None = None,
     location: str = "source",
 ) -> Conversion:
-    """As `convert`, without its warnings; errors about the source name `location`."""
+    """As `convert`, but without warnings. Errors about the source are reported at `location`."""
     kind = operands.kind_of(source, {Kind.PICTURE, Kind.NAME, Kind.CODE, Kind.TABLE, Kind.DOCUMENT}, location)
     if phi is not None and kind is not Kind.TABLE:
         raise InputError(f"{phi} given for {source}, which is not a table of measured values", "phi", "omit it")
@@ -91,7 +91,7 @@ def converted(
 
 
 def _repeated(table: compare.Converted) -> tuple[str, ...]:
-    """A notice if the file states values where the source has none."""
+    """A notice if the file contains values at angles at which the source has none."""
     if not table.measured:
         return ()
     made = f"the other values of {table.path.name} are interpolated or repeated, which the file does not state"
@@ -99,7 +99,7 @@ def _repeated(table: compare.Converted) -> tuple[str, ...]:
 
 
 def _table_summary(table: compare.Converted) -> str:
-    """A summary of what was written, its error, and the causes of the error."""
+    """A summary of the file that was written, with its error and the causes of the error."""
     how = "resampled" if table.resampled else "the same values"
     text = f"{table.path}  {table.size / 1e6:.2f} MB, {table.kind}, {how}: {100.0 * table.error:.2g} % off on average"
     if table.reciprocity:

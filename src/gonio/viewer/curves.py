@@ -1,4 +1,4 @@
-"""Scattering by a material as numbers to plot: values and density in the plane of incidence, and albedo.
+"""Scattering by a material as data for plots: values and density in the plane of incidence, and albedo.
 
 `wo`, toward the viewer, is tilted to the left by theta_o; angles to the right of the normal, on the side of the mirror
 direction, are positive.
@@ -22,8 +22,8 @@ SAMPLES = 64  # per axis and point of an albedo curve: 4096 stratified samples, 
 
 @dataclass(frozen=True)
 class Curve:
-    """One view: values and density as functions of the angle of wi (degrees), and the reflectance of delta lobes.
-    Values and density are nan where they are not known."""
+    """Values and density for one view as functions of the angle of wi (degrees), and the reflectance of delta lobes.
+    Values and density are NaN where they are unknown."""
 
     view: float
     angles: Floats
@@ -51,7 +51,7 @@ class Curve:
         return bool(self.angles[-1] > 90)
 
     def side(self, side: int) -> NDArray[np.bool_]:
-        """Which directions lie above the surface (1), or below (-1)."""
+        """A mask of the directions that lie above (1) or below (-1) the surface."""
         above = np.abs(self.angles) <= 90
         return above if side > 0 else ~above
 
@@ -97,7 +97,7 @@ def albedo(bsdf: BSDF, views: Floats) -> Floats:
     count = SAMPLES * SAMPLES
     x, y = np.meshgrid(np.arange(SAMPLES), np.arange(SAMPLES))
     cells = np.stack([x.ravel(), y.ravel()], axis=1)
-    # The number that selects the lobe is stratified too, in an independent order.
+    # The number that selects the lobe is stratified, too, in an independent order.
     u = np.concatenate([rng.permutation(count)[:, None] / count, cells / SAMPLES], axis=1)
     u = u + rng.random(u.shape) * [1 / count, 1 / SAMPLES, 1 / SAMPLES]
     rows = []

@@ -1,4 +1,4 @@
-"""Where two materials differ: a map over the angles of view and light, and the two albedos."""
+"""The difference between two materials: a map over the angles of view and light, and both albedos."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LONGEST = 44  # characters of a name
 
 def relative(a: BSDF, b: BSDF, compared: Difference, steps: int = STEPS) -> NDArray[np.float64]:
     """(f_A - f_B) / max(f_A, f_B) in the plane of incidence, over theta_o (rows, 0 first) and theta_i from -90 to 90
-    degrees (columns, positive on the side of the mirror direction); nan if one is not known, or both are 0.
+    degrees (columns, positive on the side of the mirror direction); NaN where f_A or f_B is unknown, or both are 0.
 
     compared  the comparison of the two materials
     steps     number of values of theta_o
@@ -39,11 +39,12 @@ def relative(a: BSDF, b: BSDF, compared: Difference, steps: int = STEPS) -> NDAr
 
 
 def draw(name_a: str, name_b: str, a: BSDF, b: BSDF, compared: Difference) -> Drawing:
-    """The map in the plane of incidence, red where A is brighter, and the albedos as functions of the viewing angle."""
+    """Draw the map in the plane of incidence, red where A is brighter, and the albedos as functions of the viewing
+    angle."""
     matplotlib = figures.load_matplotlib()
 
     title = f"{_short(name_a)} (A) and {_short(name_b)} (B)"
-    subtitle = f"mean difference {100.0 * compared.mean:.3g} % of B's light, largest {100.0 * compared.largest:.3g} %"
+    subtitle = f"mean difference {100.0 * compared.mean:.3g} % of B, largest {100.0 * compared.largest:.3g} %"
     with matplotlib.rc_context(figures.STYLE):
         figure = figures.blank(9.6, 4.6, title, subtitle)
         axes = figure.add_axes((0.07, 0.12, 0.36, 0.68))
@@ -55,7 +56,7 @@ def draw(name_a: str, name_b: str, a: BSDF, b: BSDF, compared: Difference) -> Dr
         axes.set_xlabel("angle θi of wi, degrees (positive: the mirror's side)")
         axes.set_ylabel("angle θo of wo, degrees")
         bar = figure.colorbar(shown, cax=figure.add_axes((0.445, 0.12, 0.014, 0.68)))
-        bar.set_label("(A - B) / the larger of both")
+        bar.set_label("(A - B) / max(A, B)")
         _albedos(figure.add_axes((0.62, 0.12, 0.35, 0.68)), compared)
     return Drawing(figure, f"{title}: {subtitle}")
 

@@ -1,4 +1,4 @@
-"""Figures of energy: baked tables with axes, and a comparison of compensation methods."""
+"""Figures of baked albedo tables, and of a comparison of compensation methods."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from . import figures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SLICES = 4  # most slices of a table with three axes
+SLICES = 4  # largest number of slices of a table with three axes
 
 
 class _Panel(NamedTuple):
@@ -29,9 +29,10 @@ class _Panel(NamedTuple):
 
 
 def draw_tables(folder: str | Path) -> figures.Drawing:
-    """Plot a baked folder: every table over n.v and roughness, low roughness at the bottom as in the homework.
+    """Plot a folder of baked tables over n.v and roughness, with low roughness at the bottom, as in the homework.
 
-    Slices of a third axis are placed side by side; E_avg, and anything that depends only on the cosine, is a curve.
+    Slices along a third axis are placed side by side. E_avg, and any table that depends only on the cosine, is drawn as
+    a curve.
     """
     mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
@@ -60,7 +61,7 @@ def draw_tables(folder: str | Path) -> figures.Drawing:
 
 
 def _levels(baked: Baked) -> Figure:
-    """The levels of an environment encoded as sRGB, with an exposure at which a twentieth of the map is white."""
+    """Draw the levels of an environment, encoded as sRGB, with an exposure at which a twentieth of the map is white."""
     mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
@@ -120,7 +121,7 @@ def _rows(baked: Baked, name: str) -> list[list[_Panel]]:
 
 
 def _place(axis: str, value: float) -> str:
-    """A node of a third axis as text."""
+    """A value on a third axis as text."""
     if axis == "phi":
         return f"phi = {np.degrees(value):.0f}°"
     return f"eta = {(1.0 + value) / (1.0 - value):.2f}"
@@ -142,8 +143,8 @@ def _draw(axes: Any, panel: _Panel, baked: Baked) -> None:
 
 
 def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
-    """Write compensation.png and compensation.json to a folder: albedo as a function of roughness, and the distance to
-    the random walk."""
+    """Write compensation.png and compensation.json to a folder, with the albedo as a function of roughness, and its
+    error against the random walk."""
     mpl = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
@@ -162,7 +163,7 @@ def plot_comparison(comparison: dict[str, Any], folder: Path) -> None:
 
 
 def _compare(comparison: dict[str, Any], axes: Any) -> None:
-    """One column per material: above, the albedo by every method; below, its distance to the random walk."""
+    """Draw one column per material: above, the albedo by every method; below, its error against the random walk."""
     roughness = comparison["roughness"]
     middle = len(comparison["mu"]) // 2
     colors = {m: f"C{index}" for index, m in enumerate(comparison["cost"])}
@@ -186,4 +187,4 @@ def _compare(comparison: dict[str, Any], axes: Any) -> None:
         axes[1, column].set(xlabel="roughness", yscale="log")
         axes[1, column].grid(True)
     axes[0, 0].set_ylabel(f"albedo at mu = {comparison['mu'][middle]:g}, mean of channels")
-    axes[1, 0].set_ylabel("RMS distance to the walk")
+    axes[1, 0].set_ylabel("RMS error of the albedo")

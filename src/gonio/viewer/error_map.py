@@ -1,4 +1,4 @@
-"""`gonio compare` and `go.compare`: the difference between two pictures or two materials, and where it is."""
+"""`gonio compare` and `go.compare`: the difference between two pictures or two materials, with an error map."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from . import difference_map, figures
 
 _DPI = 100
 _TITLES = {
-    "rmse": "root of the squared difference, mean over channels",
+    "rmse": "RMS difference over the channels",
     "relmse": "(x − r)² / (r² + 0.01), mean over channels",  # noqa: RUF001
     "flip": "FLIP",
 }
@@ -64,15 +64,15 @@ def compare(
         go.compare(go.OrenNayar(sigma=0.5), "lambert").largest
 
     test, reference  files (.exr, .hdr, .png, .npz), or linear RGB of shape (H, W, 3), row 0 on top; or two materials,
-                     as `go.material` takes them
-    metric           the metric that `tolerance` and the map use: for pictures "relmse", "rmse" or "flip", for materials
-                     "mean", "largest" or "albedo"; None: the first of these
+                     in any form that `go.material` accepts
+    metric           the metric for `tolerance` and the map: for pictures, "relmse", "rmse" or "flip"; for materials,
+                     "mean", "largest" or "albedo"; None selects the first of these
     tolerance        the largest value that passes
-    output           file of a map of the error, .png, .pdf or .svg; None writes nothing
+    output           file for an error map, .png, .pdf or .svg; None writes nothing
     encoding         encoding of .png files: "srgb", or "linear" for data such as a table
-    Returns a Comparison with all metrics and whether it passed; for materials, a Difference, which also gives the
-    places where f and the albedo differ most. FLIP is HDR-FLIP, unless a picture is a .png. Raises InputError for
-    pictures that cannot be read or differ in size, and for arguments that are neither pictures nor materials.
+    Returns a Comparison with all metrics and the verdict; for materials, a Difference, which also states the directions
+    in which f and the albedo differ most. FLIP is HDR-FLIP, unless a picture is a .png. Raises InputError for pictures
+    that cannot be read or differ in size, and for arguments that are neither pictures nor materials.
     """
     if output is not None:
         figures.check_output(Path(output))
@@ -92,7 +92,7 @@ def compare(
 def compare_materials(
     test: Any, reference: Any, metric: str, tolerance: float | None, output: str | Path | None
 ) -> Difference:
-    """As `compare`, for two materials, each a string or an object."""
+    """As `compare`, for two materials, each of which is a string or an object."""
     named = []
     for one in (test, reference):
         if not _is_material(one):
@@ -129,7 +129,7 @@ def _picture(given: object, name: str, encoding: str) -> images.Picture:
 
 
 def error_of(test: images.Picture, reference: images.Picture, metric: str) -> NDArray[np.floating]:
-    """The (H, W) map whose mean is the metric (for rmse, the root of the mean of its squares)."""
+    """The (H, W) map whose mean is the metric (for rmse, whose root mean square is the metric)."""
     if metric == "flip":
         return metrics.flip_map(test.pixels, reference.pixels, test.hdr and reference.hdr)
     if metric == "relmse":
@@ -139,8 +139,8 @@ def error_of(test: images.Picture, reference: images.Picture, metric: str) -> ND
 
 
 def draw(test: images.Picture, reference: images.Picture, metric: str) -> figures.Drawing:
-    """Draw the map. The range is 0 to 1 for FLIP, otherwise 0 to the 99.5th percentile, so that a few fireflies do
-    not darken the rest; an arrow on the color bar shows that there are larger values."""
+    """Draw the map. The range is 0 to 1 for FLIP, otherwise 0 to the 99.5th percentile, so that a few fireflies do not
+    darken the rest of the map. An arrow on the color bar indicates larger values."""
     matplotlib = figures.load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -150,7 +150,7 @@ def draw(test: images.Picture, reference: images.Picture, metric: str) -> figure
     height, width = error.shape
     scale = min(1.0, 3000 / width) if width >= 480 else max(1, 480 // width)
     shown_width, shown_height = width * scale, height * scale
-    # The bar is at the bottom, since most pictures are wide.
+    # The bar is at the bottom, because most pictures are wide.
     left, top, bottom = 16, 58, 62
     total_width, total_height = shown_width + 2 * left, shown_height + top + bottom
     with matplotlib.rc_context(figures.STYLE):
@@ -158,7 +158,7 @@ def draw(test: images.Picture, reference: images.Picture, metric: str) -> figure
         FigureCanvasAgg(figure)
         box = (left / total_width, bottom / total_height, shown_width / total_width, shown_height / total_height)
         axes = figure.add_axes(box)
-        # Magma's lightness is uniform, so equal steps of error look equal, also in gray print.
+        # Magma is perceptually uniform, so equal steps of error look equal, even when printed in gray.
         shown = axes.imshow(error, cmap="magma", vmin=0, vmax=highest, interpolation="antialiased", aspect="auto")
         axes.set_axis_off()
         bar_width = min(shown_width, 420)

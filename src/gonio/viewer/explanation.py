@@ -12,12 +12,12 @@ from . import families, manual
 
 @dataclass(frozen=True)
 class Explanation:
-    """One page, or one per member with the given name; `print` shows their text."""
+    """One page, or one page per member with the given name. `print` shows the text."""
 
     pages: tuple[manual.Page | families.MemberPage | families.FamilyPage, ...]
 
     def as_dict(self) -> dict[str, object]:
-        """Dictionary for JSON: the first page, with the others as `also`."""
+        """A dictionary for JSON: the first page, with the other pages under `also`."""
         first, *others = (page.as_dict() for page in self.pages)
         return {**first, "also": others} if others else first
 
@@ -36,8 +36,8 @@ def explain(name: MaterialLike = "") -> Explanation:
         print(go.explain("conductor"))
         print(go.explain("ggx"))
 
-    name  a material, as `go.material` takes it, a distribution of normals, a masking term, an integrator, a law, ...;
-          or a family, such as "fresnel", whose members are listed; "" lists the families
+    name  a material, in any form that `go.material` accepts; the name of a distribution of normals, a masking term, an
+          integrator, a law, ...; or a family, such as "fresnel", whose members are listed; "" lists the families
     Raises InputError, with the closest known name, for an unknown name.
     """
     if not name:

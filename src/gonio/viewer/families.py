@@ -19,7 +19,7 @@ WIDTH = 100
 
 
 class Home(NamedTuple):
-    """Where a family's base class is defined, and how a member is used."""
+    """The module that defines a family's base class, and the use of a member."""
 
     module: str
     base: str
@@ -36,7 +36,7 @@ HOMES = (
     Home("gonio.shaders.languages", "Language", "gonio emit MODEL --lang {name}"),
     Home("gonio.instruments.surfaces.base", "Surface", "gonio measure --surface {name} -o FILE"),
     Home("gonio.measure.tables.base", "Measurement", "gonio measure MODEL --table {name} -o FILE.gonio"),
-    Home("gonio.measure.formats.base", "Format", "a file with its suffix, wherever measured values may stand"),
+    Home("gonio.measure.formats.base", "Format", "a file with its suffix, wherever measured values are accepted"),
     Home("gonio.measure.compression.base", "Method", "gonio compress FILE --codec {name} -o OUT.gonio"),
     Home("gonio.catalog.documents", "Document", 'in a scene {{"type": "{name}", "file": ...}}'),
     Home("gonio.viewer.panels.base", "Panel", "a panel of gonio view"),
@@ -49,9 +49,9 @@ class MemberPage:
 
     kind      kind of the family's members, such as "masking term"
     doc       docstring of the member
-    formulas  its own methods: name -> first line of the docstring
-    use       how it is used
-    source    file that defines it
+    formulas  methods of the member: name -> first line of the docstring
+    use       example of its use
+    source    file that defines the member
     """
 
     name: str
@@ -74,7 +74,7 @@ class MemberPage:
 
 @dataclass(frozen=True)
 class FamilyPage:
-    """A family: its members by name, with one line each."""
+    """The description of a family: its members by name, with one line per member."""
 
     name: str
     doc: str
@@ -101,12 +101,13 @@ def index() -> FamilyPage:
     """The list of all families, for a call without a name."""
     names = {_plural(kind): ", ".join(family.all()) for kind, (family, _) in families().items()}
     lines = {kind: text for kind, text in names.items() if text}
-    doc = "The kinds of parts of which Gonio has several, and to which your own files may add."
+    doc = "The kinds of components that Gonio provides and that you can extend with your own files."
     return FamilyPage("family", doc, lines, "gonio explain NAME")
 
 
 def pages(name: str) -> list[MemberPage | FamilyPage]:
-    """The pages for a name: one per member of that name, or that of a family. Raises InputError for an unknown name."""
+    """The pages for a name: one per member with this name, or the page of a family. Raises InputError for an unknown
+    name."""
     if outside.names_code(name):
         return [_of_code(name)]
     known = families()
@@ -141,7 +142,7 @@ def _base(home: Home) -> type:
 
 
 def _page(member: Any, home: Home, called: str = "") -> MemberPage:
-    """The page of a member; `called` is how a command names it, by default by its name."""
+    """The page of a member. `called` is its name in commands, by default the member's own name."""
     cls = member if isinstance(member, type) else type(member)
     formulas = {
         name: (inspect.getdoc(thing) or "").partition("\n")[0]
@@ -164,7 +165,7 @@ def _page(member: Any, home: Home, called: str = "") -> MemberPage:
 
 
 def _aliases(kind: str, family: Family[Any]) -> set[str]:
-    """The names of a family: "masking terms", "masking", "maskings"."""
+    """The accepted names of a family: "masking terms", "masking", "maskings"."""
     return {_key(word) for word in (kind, kind.split()[-1], family.group.partition(".")[2], family.where)}
 
 

@@ -1,4 +1,4 @@
-"""Shared parts of all figures: style, files, and values typed on the command line."""
+"""Functions shared by all figures: style, output files, and values from the command line."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".pdf", ".svg")
-SUBTITLE = 9.5  # size of letters, points
+SUBTITLE = 9.5  # font size, in points
 INK, SOFT, FAINT = "#1d2530", "#6b7683", "#d9dee4"
-CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green, blue, of equal weight on white
+CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green and blue with equal contrast on white
 # distinguishable for color-blind readers too
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a6761d", "#56b4e9", "#1d2530")
 DASHES = (0, (4, 2))
@@ -49,9 +49,10 @@ STYLE: Any = {  # Matplotlib types its keys one by one
 
 
 def load_matplotlib() -> ModuleType:
-    """Matplotlib, with the user's settings instead of those of the current folder.
+    """Matplotlib, with the user's settings instead of those in the current folder.
 
-    On import, Matplotlib prefers a file `matplotlibrc` there; such a file may name modules and programs to run.
+    On import, Matplotlib prefers a file `matplotlibrc` in the current folder; such a file may specify modules and
+    programs to run.
     """
     hidden = "matplotlib" not in sys.modules and os.path.exists("matplotlibrc")
     with contextlib.chdir(os.sep) if hidden else contextlib.nullcontext():
@@ -61,9 +62,9 @@ def load_matplotlib() -> ModuleType:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure, which a notebook shows and `save` writes.
+    """A figure, which a notebook displays and `save` writes to a file.
 
-    path  the file that it was written to, or None
+    path  the file to which the figure was written, or None
     """
 
     figure: Figure
@@ -72,7 +73,7 @@ class Drawing:
     path: Path | None = None
 
     def save(self, path: str | Path) -> Drawing:
-        """Write the figure as .png, .pdf or .svg, completely or not at all. Returns the drawing with that path."""
+        """Write the figure as .png, .pdf or .svg, completely or not at all. Returns the drawing with its `path`."""
         suffix = _suffix(Path(path))
         return replace(self, path=files.write_whole(path, self._file(suffix[1:])))
 
@@ -80,7 +81,7 @@ class Drawing:
         return self._file("png")
 
     def _file(self, kind: str) -> bytes:
-        """The figure in a file format; the bytes are the same each time."""
+        """The figure in a file format; repeated calls return the same bytes."""
         matplotlib = load_matplotlib()
         from matplotlib.text import Text
 
@@ -96,7 +97,7 @@ class Drawing:
 
 
 def check_output(path: Path) -> Path:
-    """Raise InputError if no figure can be written to `path`, before anything is computed."""
+    """Raise InputError if no figure can be written to `path`. It is called before anything is computed."""
     _suffix(path)
     files.check_file(path)
     return path
@@ -111,11 +112,11 @@ def _suffix(path: Path) -> str:
 
 
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
-    """An empty figure with a heading, whose subtitle takes several lines if it is wider than the figure.
+    """An empty figure with a title and a subtitle, which takes several lines if it is wider than the figure.
 
-    It opens no window, whatever the backend.
+    No window is opened, regardless of the backend.
 
-    width, height  size of the figure, inches
+    width, height  size of the figure, in inches
     """
     load_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -135,7 +136,7 @@ def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
 
 
 def legend_size(handles: Sequence[Artist], width: float) -> tuple[int, float]:
-    """The number of columns and the height, in inches, of a legend along the lower edge that is `width` inches wide."""
+    """The number of columns, and the height in inches, of a legend along the lower edge that is `width` inches wide."""
     longest = max(len(str(handle.get_label())) for handle in handles)
     columns = min(len(handles), max(1, int(width / (0.75 + 0.075 * longest))))
     return columns, 0.3 + 0.2 * math.ceil(len(handles) / columns)
@@ -147,7 +148,7 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
 
 
 def parse_value(text: str) -> Any:
-    """A typed value: JSON if possible, where a leading zero is optional; otherwise the string itself."""
+    """The value of a text: parsed as JSON if possible, where a leading zero is optional; otherwise, the text itself."""
     stripped = text.strip()
     with_zeros = re.sub(r"(?<![\w.])\.(?=\d)", "0.", stripped)
     try:

@@ -1,4 +1,4 @@
-"""The figure of a fit: the measured values, the fitted ones, and their difference."""
+"""The figure of a fit: the measured values, the fitted values, and their difference."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ SLICES = (20.0, 60.0)  # angles of view, degrees
 
 
 def draw(fit: Fit, table: str | Path | Measurement) -> Drawing:
-    """Spheres under one light, slices in the plane of incidence, and images over theta_h and theta_d (Burley2012):
-    the data, the fit, and the difference relative to the larger one, on a scale that ends at 50 %."""
+    """Draw spheres under one light, slices in the plane of incidence, and images over theta_h and theta_d (Burley2012)
+    of the data, the fit, and their difference relative to the larger value, on a scale that ends at 50 %."""
     matplotlib = figures.load_matplotlib()
     from matplotlib.figure import Figure
 
@@ -51,7 +51,7 @@ def draw(fit: Fit, table: str | Path | Measurement) -> Drawing:
         _slices(axes[1], measured, fitted)
         _images(axes[2], measured, fitted, name)
         figure.suptitle("\n".join(textwrap.wrap(fit.text, 120)[:3]), fontsize=9)
-        figure.supxlabel(f"{100.0 * fit.relative:.3g} % off on average, of {fit.count} values", fontsize=9)
+        figure.supxlabel(f"mean error of {fit.count} values: {100.0 * fit.relative:.3g} %", fontsize=9)
     return Drawing(figure, str(fit))
 
 
@@ -111,7 +111,7 @@ def _slices(axes: list[Axes], measured: Values, fitted: Values) -> None:
 
 
 def _images(axes: list[Axes], measured: Values, fitted: Values, name: str) -> None:
-    """Images over theta_h (to the right, by its square root) and theta_d (upward), at phi_d = 90 degrees."""
+    """Draw images over the square root of theta_h (to the right) and theta_d (upward), at phi_d = 90 degrees."""
     x, y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE, (np.arange(SIZE) + 0.5) / SIZE)
     theta_h, theta_d = x * x * (0.5 * np.pi), y * (0.5 * np.pi)
     wo, wi = pair_at(theta_h.ravel(), theta_d.ravel(), np.full(x.size, 0.5 * np.pi))
@@ -141,7 +141,7 @@ def _half_difference_axes(axis: Axes) -> None:
 
 
 def _difference(axis: Axes, a: Floats, b: Floats, over_angles: bool = False) -> None:
-    """(b - a) / max(a, b) of the mean over the channels, from -50 to 50 %."""
+    """Draw (b - a) / max(a, b) for the means over the channels, from -50 to 50 %."""
     one, other = a.mean(-1), b.mean(-1)
     largest = np.maximum(np.maximum(np.abs(one), np.abs(other)), 1e-3 * np.nanmax(np.abs(one)))
     image = axis.imshow(

@@ -1,4 +1,4 @@
-"""`gonio plot fresnel`: reflectances over angle, from both sides, and the errors of approximations."""
+"""`gonio plot fresnel`: reflectances as functions of the angle, from both sides, and the errors of approximations."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ APPROXIMATIONS = {"schlick": "Schlick", "f82": "F82"}
 ANGLES = np.concatenate([np.linspace(0.0, 80.0, 321), np.linspace(80.0, 90.0, 201)[1:]])  # degrees
 LINES = {"schlick": (0, (5, 2)), "f82": (0, (1, 1.4))}
 INDICES = (0.1, 4.0)  # range of the map
-GLASS = (1.05, 3.0)  # range without absorption; at 1 there is no surface, but the curve still ends at 1
+GLASS = (1.05, 3.0)  # range without absorption; at 1, there is no surface, but the curve still ends at 1
 
 
 class Index(NamedTuple):
-    """An index to plot: its label, its color, eta and k."""
+    """An index of refraction to plot: its label, its color, eta and k."""
 
     label: str
     color: str
@@ -38,9 +38,9 @@ class Index(NamedTuple):
 
 
 def draw(eta: float | None = None, k: float = 0.0, metal: str | None = None) -> Drawing:
-    """The figure of one interface: an index eta + i k, or a metal by name at red, green and blue.
+    """The figure of one interface, given by an index eta + i k, or by the name of a metal at red, green and blue.
 
-    Raises InputError for an impossible index, and for an unknown metal.
+    Raises InputError for an impossible index or an unknown metal.
     """
     matplotlib = figures.load_matplotlib()
 
@@ -89,7 +89,7 @@ def _figure(title: str, lines: Sequence[Index]) -> Figure:
 
 
 def _reflectances(axes: Axes, below: Axes, lines: Sequence[Index], side: str) -> None:
-    """Both polarizations, their mean and the approximations; the errors below them."""
+    """Draw both polarizations, their mean and the approximations, with the errors of the approximations below."""
     for line in lines:
         at = fresnel.fresnel(np.radians(ANGLES), line.eta, line.k)
         width = 1.0 if len(lines) > 1 else 1.4
@@ -102,7 +102,7 @@ def _reflectances(axes: Axes, below: Axes, lines: Sequence[Index], side: str) ->
             axes.plot(ANGLES, reflectance, color=line.color, linewidth=1.2, linestyle=LINES[name])
             below.plot(ANGLES, reflectance - at.R, color=line.color, linewidth=1.4, linestyle=LINES[name])
         least, critical = float(np.degrees(at.brewster[0])), float(np.degrees(at.critical[0]))
-        _mark(axes, least, "Brewster" if line.k == 0.0 else "least Rp", line, len(lines))
+        _mark(axes, least, "Brewster" if line.k == 0.0 else "minimum of Rp", line, len(lines))
         if np.isfinite(critical):
             _mark(axes, critical, "critical", line, len(lines))
     axes.set_title(side, fontsize=11, fontweight="bold")
@@ -116,7 +116,7 @@ def _reflectances(axes: Axes, below: Axes, lines: Sequence[Index], side: str) ->
 
 
 def _mark(axes: Axes, angle: float, name: str, line: Index, count: int) -> None:
-    """A line at a named angle, labeled on the side where the curves are low."""
+    """Draw a line at a named angle, with a label on the side where the curves are low."""
     axes.axvline(angle, color=line.color if count > 1 else figures.SOFT, linewidth=0.8, linestyle=":", zorder=0)
     if count == 1:
         near_left = angle < 25.0
@@ -143,7 +143,8 @@ def _phases(axes: Axes, lines: Sequence[Index]) -> None:
 
 
 def _differences(axes: Axes, lines: Sequence[Index]) -> None:
-    """The phase difference of s and p: linearly polarized light becomes elliptical, or circular at 90 degrees."""
+    """Draw the phase difference of s and p, by which linearly polarized light becomes elliptically polarized, or
+    circularly polarized at 90 degrees."""
     for line in lines:
         at = fresnel.fresnel(np.radians(ANGLES), line.eta, line.k)
         retardance = np.degrees(np.unwrap(np.angle(-at.r_p * np.conj(at.r_s))))
@@ -163,7 +164,7 @@ def _over_angle(axes: Axes) -> None:
 
 
 def _map(figure: Figure, axes: Axes, lines: Sequence[Index]) -> None:
-    """Schlick's error over index and angle, at the k of the first line."""
+    """Draw Schlick's error as a function of index and angle, at the mean k of the lines."""
     k = float(np.mean([line.k for line in lines]))
     low, high = INDICES if k else GLASS
     etas, angles = np.linspace(low, max(high, *(line.eta * 1.1 for line in lines)), 160), np.linspace(0.0, 90.0, 181)
@@ -173,7 +174,7 @@ def _map(figure: Figure, axes: Axes, lines: Sequence[Index]) -> None:
         angles, etas, errors, cmap="RdBu_r", vmin=-top, vmax=top, shading="gouraud", rasterized=True
     )
     levels = np.linspace(-top, top, 16)  # none at 0, where rounding errors would draw extra lines
-    # without labels, which would overlap in the corners; the color bar has the values
+    # The contours have no labels, which would overlap in the corners; the color bar shows the values.
     axes.contour(angles, etas, errors, levels=levels, colors=figures.INK, linewidths=0.5, alpha=0.5)
     for line in lines:
         axes.axhline(line.eta, color=line.color, linewidth=1.2, linestyle=figures.DASHES)
@@ -208,7 +209,7 @@ def _legend(lines: Sequence[Index]) -> list[Artist]:
 
 
 def approximation(name: str, degrees: Reals, index: Index) -> Reals:
-    """R of a Fresnel term at the given angles, from the side given by eta."""
+    """R of a Fresnel term at the given angles, from the side that eta implies."""
     types = backend.types("float64")
     kind = fresnel.kind(name)
     cos, eta = types.float(np.maximum(np.cos(np.radians(degrees)), 0.0)), types.float(index.eta)
@@ -219,7 +220,7 @@ def approximation(name: str, degrees: Reals, index: Index) -> Reals:
 
 
 def schlick_error(etas: Reals, degrees: Reals, k: float = 0.0) -> Reals:
-    """Schlick's approximation minus the exact reflectance, (index, angle)."""
+    """Schlick's approximation minus the exact reflectance, as an array (index, angle)."""
     eta, angle = np.meshgrid(etas, np.radians(degrees), indexing="ij")
     c = np.maximum(1.0 - np.cos(angle), 0.0)
     at = fresnel.fresnel(angle, eta, k)

@@ -30,16 +30,16 @@ class AccessControl:
     def __init__(self, host: str, token: str | None = None):
         self.token = token or secrets.token_urlsafe(24)
         self.names = {"localhost", host.lower()}
-        if host in ("0.0.0.0", "::"):  # the user opened it to the network: its name is valid too
+        if host in ("0.0.0.0", "::"):  # the server is open to the network, so the machine's name is valid, too
             self.names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
 
     def refusal(self, headers: Headers, query: bytes, needs_origin: bool) -> str:
-        """The reason for refusing a request; "" if it is accepted."""
+        """The reason for refusing a request; "" if the request is accepted."""
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
             return "wrong Host"
         origins = headers.getlist("origin")
-        # The port may differ (a tunnel), but the browser must have addressed the page by the same name.
+        # The port may differ (in a tunnel), but the browser must have addressed the page by the same host name.
         if origins != [f"http://{hosts[0]}"] and (needs_origin or origins):
             return "wrong Origin"
         given = parse_qs(query.decode("latin-1")).get("token", [""])
@@ -65,10 +65,10 @@ class AccessControl:
 class GuardedHTTP(H11Protocol):
     """HTTP that ends connections whose request does not arrive, or whose response is not received, in time.
 
-    If there are too many of either kind, the oldest is ended.
+    If there are too many connections of either kind, the oldest is ended.
     """
 
-    waiting: dict[GuardedHTTP, asyncio.TimerHandle]  # for requests; `Server` sets these two, one pair per server
+    waiting: dict[GuardedHTTP, asyncio.TimerHandle]  # for requests; `Server` sets both dictionaries for each server
     answering: dict[GuardedHTTP, asyncio.TimerHandle]
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -106,15 +106,15 @@ class GuardedHTTP(H11Protocol):
 class GuardedSocket(WebSocketsSansIOProtocol):
     """A WebSocket with limits that uvicorn lacks.
 
-    Its connection ends with its session, even if the peer no longer reads, and after an invalid handshake. Frames that
-    are not messages (empty fragments, pings, pongs) are limited too, since they cost time and memory.
+    The connection ends with its session, even if the peer no longer reads, and after an invalid handshake. Frames that
+    are not messages (empty fragments, pings, pongs) are limited, too, because they cost time and memory.
     """
 
     controls = 0
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        # asyncio's default is 256 KiB: a third of a second of empty frames
+        # asyncio's default is 256 KiB, enough for empty frames that take a third of a second to process
         transport.max_size = READ_BYTES  # type: ignore[attr-defined]
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -124,7 +124,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
-        if not self.handshake_initiated:  # uvicorn passes a complete request: no later data can complete this one
+        if not self.handshake_initiated:  # uvicorn passes complete requests, so no later data can complete this one
             self.transport.abort()
 
     def handle_cont(self, event: Frame) -> None:
@@ -142,7 +142,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         self._count_control()
 
     def _count_control(self) -> None:
-        """Count a ping or pong: scripts on a page cannot send any; a program that monitors its connection sends few."""
+        """Count a ping or pong. Scripts on a page cannot send these; programs that monitor a connection send few."""
         self.controls += 1
         if self.controls > MAX_CONTROLS:
             self._refuse(REFUSED, "too many pings")

@@ -1,8 +1,8 @@
-"""Image slices of materials: f over half vector and difference angle at phi_d = 90 degrees, as usual for measured
-BRDFs.
+"""Image slices of materials: f as a function of half angle and difference angle at phi_d = 90 degrees, as is usual for
+measured BRDFs.
 
-The highlight is at the left edge, grazing angles with the rise of Fresnel reflectance at the top, retro-reflection at
-the bottom.
+The highlight is at the left edge, the rise of the Fresnel reflectance toward grazing angles at the top, and
+retro-reflection at the bottom.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STEPS = 180  # pixels along each axis
-ACROSS = 4  # most panels in a row
-LONGEST = 32  # most characters in a panel's title
+ACROSS = 4  # largest number of panels in a row
+LONGEST = 32  # largest number of characters in a panel's title
 
 
 def slice_of(bsdf: BSDF, steps: int = STEPS) -> NDArray[np.float64]:
-    """f at `steps` values each of theta_d (rows, 90 degrees first) and theta_h (columns); nan where it is not known. At
-    phi_d = 90 degrees, all pairs are above the surface."""
+    """f at `steps` values each of theta_d (rows, 90 degrees first) and theta_h (columns); NaN where f is unknown. At
+    phi_d = 90 degrees, all pairs of directions are above the surface."""
     middle = (np.arange(steps) + 0.5) / steps * (0.5 * np.pi)
     theta_d, theta_h = (a.ravel() for a in np.meshgrid(middle[::-1], middle, indexing="ij"))
     wo, wi = pair_at(theta_h, theta_d, np.full(theta_h.shape, 0.5 * np.pi))
@@ -36,7 +36,8 @@ def slice_of(bsdf: BSDF, steps: int = STEPS) -> NDArray[np.float64]:
 
 
 def draw(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
-    """One panel per material, on the same scale: sRGB of pi f, clamped to 1; values below 0 are magenta."""
+    """Draw one panel per material, with the same scale: pi f, clamped to 1 and encoded as sRGB; values below 0 are
+    magenta."""
     subtitle = "π f at φd = 90°, as sRGB, clamped to 1; magenta: below 0"
     if not all(bsdf.angular_range.everything for bsdf in bsdfs):
         subtitle += "; gray: not measured"

@@ -1,4 +1,4 @@
-"""The materials of a lab scene on balls, under its light, for `gonio view SCENE`."""
+"""The materials of a scene in Lab 2's format, on balls under the scene's light, for `gonio view SCENE`."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from .stage import CAMERA, SUN, Ball, Camera, Light, Material, Row, Stage, Value
 
 Vector: TypeAlias = "NDArray[np.float64]"
 
-LARGEST_IMAGE = 1024  # largest width of an environment in a page; a wider one is downsampled
+LARGEST_IMAGE = 1024  # largest width of an environment in a page; wider environments are downsampled
 BALLS = 5  # per row
 ENVIRONMENT: Light = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
 
 
 def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> Stage:
-    """The materials of a lab scene on balls, under its light.
+    """The stage with the materials of a scene on balls, under the scene's light.
 
-    Each distinct material is a ball; materials of one model and the same choices share a row. Each lamp becomes a
-    directional light with the lamp's direction and unoccluded irradiance at the point that the camera looks at. An
-    environment, or a lamp that surrounds that point, becomes an environment. A texture cannot be shown by sliders, so
-    it is replaced by its parameter's default, with a note.
+    Each distinct material is a ball; materials of one model and with the same choices share a row. Each lamp becomes a
+    directional light with the lamp's direction and unoccluded irradiance at the point at which the camera looks. An
+    environment, or a lamp that surrounds this point, becomes an environment. A texture cannot be represented by
+    sliders, so it is replaced by its parameter's default, with a note.
 
     allow_outside  allow the scene to read files outside its folder
     allow_code     allow the scene to run materials in Python files
-    Raises InputError as the reader of scenes does, including for a file outside the scene's folder.
+    Raises InputError for an invalid scene and for a file outside the scene's folder.
     """
     description = scene.read(path, allow_outside=allow_outside, allow_code=allow_code, names_output=False)
     parts = _materials(description)
@@ -64,7 +64,8 @@ def _materials(description: schema.SceneDescription) -> list[MaterialPart]:
 
 
 def _bsdf(part: MaterialPart, description: schema.SceneDescription) -> BSDF:
-    """The material with its numbers, including those of named presets; textures are replaced by defaults."""
+    """The material with its numeric parameters, including those of named presets; textures are replaced by
+    defaults."""
     return replaced(part.instance(description.locate), dict(_indices(part)))
 
 
@@ -119,8 +120,8 @@ def _code(bsdf: BSDF) -> tuple[object, ...]:
 
 
 def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
-    """One ball per material, labeled by its distinguishing values; it stores the values that differ from the first
-    material's."""
+    """One ball per material, labeled with its distinguishing values. It stores the values that differ from those of the
+    first material."""
     values = [
         {leaf.path: _listed(leaf.value) for leaf in tree.leaves(member) if leaf.parameter.numeric} for member in members
     ]
@@ -148,7 +149,7 @@ def _listed(value: ArrayLike) -> float | list[float]:
 
 
 def _lights(description: schema.SceneDescription) -> tuple[tuple[Light, ...], list[str]]:
-    """The scene's lights in the page's format, and notes on those that are changed."""
+    """The scene's lights in the page's format, and notes about those that are changed."""
     placed = description.camera.transform
     target = np.array(placed.look_at, float)
     axes, _ = _axes(placed)
@@ -182,7 +183,7 @@ def _lights(description: schema.SceneDescription) -> tuple[tuple[Light, ...], li
 
 
 def _surrounds(light: schema.AreaLight, target: Vector) -> bool:
-    """Whether a lamp is a sphere around the point."""
+    """Whether a lamp is a sphere that encloses the point."""
     if not isinstance(light.shape, schema.Sphere):
         return False
     center = (light.shape.transform.matrix() @ [*light.shape.center, 1.0])[:3]
@@ -190,10 +191,11 @@ def _surrounds(light: schema.AreaLight, target: Vector) -> bool:
 
 
 def _axes(placed: schema.CameraTransform) -> tuple[Vector, float]:
-    """(the page's x, y, z axes in the scene, elevation of the camera): the scene rotated so that its camera looks along
-    -z.
+    """The page's x, y and z axes in the scene, and the elevation of the camera. The scene is rotated so that its camera
+    looks along -z.
 
-    If the scene's up is +y, it is preserved and the camera has its elevation; otherwise the camera's own axes are used.
+    If the scene's up direction is +y, it is preserved, and the camera keeps its elevation. Otherwise, the camera's own
+    axes are used.
     """
     back = np.array(placed.position, float) - np.array(placed.look_at, float)
     back /= np.linalg.norm(back)
@@ -207,7 +209,8 @@ def _axes(placed: schema.CameraTransform) -> tuple[Vector, float]:
 
 
 def _area(light: schema.AreaLight, target: Vector) -> tuple[Vector, Vector]:
-    """(vector to the lamp's center, irradiance on a surface that faces it): L A cos / r^2, as for a distant lamp."""
+    """The vector to the lamp's center, and the irradiance on a surface that faces the lamp: L A cos / r^2, as for a
+    distant lamp."""
     shape, radiance = light.shape, np.array(spectra.colour(light.energy))
     matrix = shape.transform.matrix()
     if isinstance(shape, schema.Parallelogram):
@@ -244,7 +247,7 @@ def _environment(description: schema.SceneDescription, light: schema.Environment
 
 
 def _smaller(pixels: np.ndarray) -> np.ndarray:
-    """The pixels averaged over blocks, at most LARGEST_IMAGE wide."""
+    """The pixels, averaged over blocks so that the picture is at most LARGEST_IMAGE wide."""
     factor = -(-pixels.shape[1] // LARGEST_IMAGE)
     if factor == 1:
         return pixels

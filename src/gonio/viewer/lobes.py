@@ -1,4 +1,4 @@
-"""Lobes as polar diagrams: one panel per direction of view, with all materials in it."""
+"""Lobes as polar diagrams, with one panel per view direction that shows all materials."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _RADIUS = 1.45  # radius of a panel's disk, inches
 
 
 def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
-    """The figure. Each panel has its own scale, since peaks differ by orders of magnitude.
+    """Draw the figure. Each panel has its own scale, because peaks differ by orders of magnitude.
 
     labels  names of the materials
     panels  one list per view, with the curve of each material in the order of the labels
@@ -47,7 +47,7 @@ def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], k
         x, y = indent + column * panel_width, bottom + (rows - 1 - row) * panel_height
         axes = figure.add_axes((x / width, y / height, panel_width / width, panel_height / height))
         _panel(axes, curves, full)
-        # Equal units on both axes: as many as the panel's inches allow.
+        # Both axes have the same scale; the panel's size determines their ranges.
         axes.set_xlim(-panel_width / 2 / _RADIUS, panel_width / 2 / _RADIUS)
         low = -1.17 if full else -0.32
         axes.set_ylim(low, low + panel_height / _RADIUS)
@@ -81,7 +81,7 @@ def _handles(labels: Sequence[str], curves: Sequence[Curve]) -> list[Artist]:
 
 
 def _panel(axes: Axes, curves: Sequence[Curve], full: bool) -> None:
-    """A polar diagram in plain axes: the disk has radius 1, the normal points up, wi is at (sin, cos)."""
+    """Draw a polar diagram in Cartesian axes: the disk has radius 1, the normal points up, and wi is at (sin, cos)."""
     axes.set_axis_off()
     view = curves[0].view
     axes.text(0, 1.24, f"θo = {view:g}°", fontsize=12, fontweight="bold", ha="center", va="baseline")
@@ -93,7 +93,7 @@ def _panel(axes: Axes, curves: Sequence[Curve], full: bool) -> None:
                 _lobe(axes, curve, side, 1 / (1.06 * peak), figures.PALETTE[index] if len(curves) > 1 else "")
     x, y = math.sin(-math.radians(view)), math.cos(math.radians(view))
     _arrow(axes, x, y, figures.SOFT, 1)
-    # Labels are next to their arrows, on the upper side, or on the left of steep arrows.
+    # Labels are next to their arrows: on the upper side, or on the left of steep arrows.
     aside = (y, -x) if view > 20 else (-1, 0)
     x, y = 0.8 * x + 0.08 * aside[0], 0.8 * y + 0.08 * aside[1]
     axes.text(x, y, "wo", fontsize=9.5, color=figures.SOFT, ha="center", va="center")
@@ -114,11 +114,12 @@ def _peak(curve: Curve, side: int) -> float:
 
 
 def _lobe(axes: Axes, curve: Curve, side: int, radius: float, color: str) -> None:
-    """Values and density on one side of the surface, times `radius`. `color` is "" if there is a single material."""
+    """Draw values and density on one side of the surface, multiplied by `radius`. `color` is "" for a single
+    material."""
     theta = np.radians(curve.angles)
 
     def place(values: Floats) -> tuple[Floats, Floats]:
-        # The other side and unknown values are 0, that is at the origin, where the outline closes.
+        # The other side and unknown values are set to 0 (the origin), where the outline closes.
         r = np.nan_to_num(np.where(curve.side(side), values, 0)) * radius
         return r * np.sin(theta), r * np.cos(theta)
 
@@ -138,10 +139,10 @@ def _arrow(axes: Axes, x: float, y: float, color: str, width: float) -> None:
 
 
 def _grid(axes: Axes, side: int, peak: float, full: bool) -> None:
-    """Half a polar grid; `side` 1 is above the surface, -1 below.
+    """Draw one half of a polar grid; `side` is 1 above the surface and -1 below.
 
-    Rings are labeled with their value: in a half disk below the surface line, where the plot is empty; in a full disk
-    in the same half, on the left.
+    Rings are labeled with their values: in a half disk, below the surface line, where the plot is empty; in a full
+    disk, on the left of the same half.
     """
     ticks = _round_ticks(peak)
     arc = np.linspace(-math.pi / 2, math.pi / 2, 181)

@@ -1,4 +1,4 @@
-"""A material's manual page from its docstring and declared facts, for `gonio explain` and docs/models."""
+"""The manual page of a material, from its docstring and declared properties, for `gonio explain` and docs/models."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _WIDTH = 100
 
 @dataclass(frozen=True)
 class Row:
-    """The declaration of a parameter; `default` is "required" if there is none."""
+    """The declaration of a parameter; `default` is "required" if there is no default."""
 
     name: str
     doc: str
@@ -26,7 +26,8 @@ class Row:
 
 @dataclass(frozen=True)
 class Page:
-    """The manual page of a material; `breaks` maps names of laws to reasons, `presets` maps names to titles."""
+    """The manual page of a material. `breaks` maps the names of violated laws to reasons; `presets` maps names to
+    titles."""
 
     name: str
     title: str

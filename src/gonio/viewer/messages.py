@@ -1,6 +1,7 @@
-"""The messages between page and server, described in docs/viewer.md: JSON in, JSON and frames out.
+"""The messages between page and server, which are described in docs/viewer.md: JSON from the page, JSON and frames from
+the server.
 
-All input is validated here (types, ranges, finite numbers, and sizes), so that the rest of the server can rely on it.
+All input is validated here (types, ranges, finiteness and sizes), so that the rest of the server can rely on it.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def _direction(vector: Vector) -> Vector:
 
 
 class Part(BaseModel):
-    """The base class of messages: unknown keys, and strings in place of numbers, are invalid."""
+    """The base class of messages. Unknown keys, and strings in place of numbers, are invalid."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -67,7 +68,7 @@ class Area(Part):
 
 
 class Image(Part):
-    """A picture that was uploaded or is part of the page."""
+    """A reference to a picture that was uploaded or is part of the page."""
 
     key: Key
 
@@ -105,7 +106,7 @@ class State(Part):
 
 
 class Scene(Part):
-    """Show this scene; a newer one replaces it."""
+    """A request to render a scene, which replaces the previous request."""
 
     type: Literal["scene"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
@@ -119,14 +120,15 @@ class Scene(Part):
 
 
 class Ack(Part):
-    """Frame `frame` is on the screen: the next one may be sent."""
+    """An acknowledgment that the frame `frame` has been displayed, so that the next one may be sent."""
 
     type: Literal["ack"]
     frame: Annotated[int, Field(ge=0, lt=2**53)]
 
 
 class Upload(Part):
-    """The next binary message is an environment, float16 RGBA, row 0 on top; lights refer to it by its key."""
+    """An announcement that the next binary message is an environment, float16 RGBA, row 0 on top. Lights refer to the
+    environment by its key."""
 
     type: Literal["upload", "environment"]
     key: Key
@@ -139,8 +141,8 @@ class Upload(Part):
 
 
 class Wish(Part):
-    """Request a material's shader with other choices, including the weights `on` although they are switched off, and
-    with tables for the values `fixed`."""
+    """A request for a material's shader with other choices, with the layers of the weights `on` although they are
+    switched off, and with tables for the values `fixed`."""
 
     type: Literal["choice"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
@@ -156,7 +158,7 @@ _message: TypeAdapter[Message] = TypeAdapter(Message)
 
 
 def parse(text: str) -> Scene | Ack | Upload | Wish:
-    """The message in a JSON text. Raises InputError, which describes the fault, if it is invalid."""
+    """The message in a JSON text. Raises InputError with a description of the error if the message is invalid."""
     if len(text) > TEXT_BYTES:
         raise InputError(f"a message of {len(text)} characters", "message", f"send at most {TEXT_BYTES}")
     try:
@@ -176,13 +178,13 @@ def parse(text: str) -> Scene | Ack | Upload | Wish:
 
 
 def _short(text: str, most: int = 200) -> str:
-    """The text, shortened, since an error may be as long as the message."""
+    """The text, shortened, because an error may be as long as the message."""
     return text if len(text) <= most else text[: most - 4] + " ..."
 
 
 def _check(scene: Scene) -> None:
     if scene.width * scene.height > MAX_PIXELS:
-        raise InputError(f"{scene.width} x {scene.height} pixels", "scene", f"ask for at most {MAX_PIXELS}")
+        raise InputError(f"{scene.width} x {scene.height} pixels", "scene", f"request at most {MAX_PIXELS}")
     balls = sum(len(row.balls) for row in scene.state.rows)
     if balls > MAX_BALLS:
         raise InputError(f"{balls} balls", "scene/state/rows", f"show at most {MAX_BALLS}")
@@ -191,7 +193,7 @@ def _check(scene: Scene) -> None:
 
 
 def environment(upload: Upload, content: bytes) -> NDArray[np.float32]:
-    """The pixels of an upload: (height, width, 3) float32. Raises InputError if they do not match the announcement."""
+    """The pixels of an upload, (height, width, 3) float32. Raises InputError if they do not match the announcement."""
     if len(content) != upload.size:
         raise InputError(f"{len(content)} bytes received, {upload.size} were announced", "upload", "send float16 RGBA")
     pixels = np.frombuffer(content, "<f2").reshape(upload.height, upload.width, 4)[..., :3].astype(np.float32)
@@ -203,21 +205,22 @@ def environment(upload: Upload, content: bytes) -> NDArray[np.float32]:
 def failure(error: GonioError, kind: str = "error", wish: int | None = None) -> str:
     """An error as a message to the page.
 
-    kind  "error", shown temporarily, or "fault": an error in the user's file, shown until the next "stage"
-    wish  the id of a request that failed
+    kind  "error", which is shown temporarily, or "fault", an error in the user's file, which is shown until the next
+          "stage"
+    wish  the id of the request that failed
     """
     asked = {} if wish is None else {"id": wish}
     return json.dumps({"type": kind, **asked, "what": error.what, "where": error.where, "hint": error.hint})
 
 
 def stage(data: PageData) -> str:
-    """Materials and rows that replace those of the page."""
+    """A message with materials and rows that replace those of the page."""
     parts = {key: data[key] for key in ("revision", "materials", "scene", "dfg")}  # type: ignore[literal-required]
     return json.dumps({"type": "stage", **parts}, allow_nan=False)
 
 
 def frame(header: Mapping[str, object], pixels: NDArray[np.float32]) -> bytes:
-    """A frame: length of the header (uint32), header (JSON, padded to align the pixels to 4 bytes), float16 RGBA.
+    """A frame: length of the header (uint32), header (JSON, padded to align the pixels to 4 bytes), and float16 RGBA.
 
     pixels  (height, width, 4), row 0 on top
     """

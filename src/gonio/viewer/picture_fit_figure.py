@@ -10,7 +10,7 @@ from . import figures
 from .figures import Drawing
 
 MAX_PERCENT = 50.0  # upper limit of the scale of differences
-LINES = 4  # lines of values, two in each
+LINES = 4  # largest number of lines with fitted values; each line has two values
 
 
 def draw(fit: PictureFit) -> Drawing:

@@ -1,4 +1,4 @@
-"""`gonio plot` and `go.plot`: scattering by materials, plotted from their own `eval`, `pdf` and `sample`."""
+"""`gonio plot` and `go.plot`: plots of the scattering by materials, computed with their `eval`, `pdf` and `sample`."""
 
 from __future__ import annotations
 
@@ -40,20 +40,21 @@ def plot(
     metal: str | None = None,
     output: str | Path | None = None,
 ) -> Drawing:
-    """Plot materials: their lobes, slices or albedos in common axes, or image slices side by side.
+    """Plot lobes, slices or albedos of materials on common axes, or their image slices side by side.
 
         go.plot(go.Conductor.preset("Au", alpha=0.2), "lambert", kind="slice", output="two.png")
         go.plot("fresnel", eta=1.5)
 
-    materials  anything that `go.material` takes; or one folder written by `go.bake`; or "fresnel",
-               the reflectance of an interface over angle, from both sides, with its approximations and their errors
-    kind       "lobe" (polar), "slice" (over the angle of wi), "albedo" (over the angle of wo) or "image" (over half
-               vector and difference angle)
-    angles     up to 8 angles of wo from the normal, degrees, in [0, 90); not for "albedo" and "image"
-    eta, k     for "fresnel": the index inside divided by that outside, 1.5 if None; and its imaginary part
-    metal      for "fresnel", instead of an index: "Au", at red, green and blue
+    materials  anything that `go.material` accepts; or one folder written by `go.bake`; or "fresnel", the reflectance of
+               an interface as a function of angle, from both sides, with approximations and their errors
+    kind       "lobe" (polar plot), "slice" (over the angle of wi), "albedo" (over the angle of wo) or "image" (over
+               half angle and difference angle)
+    angles     up to 8 angles of wo from the normal, in degrees, in [0, 90); not for "albedo" and "image"
+    eta, k     for "fresnel": the real part of the relative index of refraction, inside / outside, 1.5 if None; and the
+               imaginary part
+    metal      for "fresnel", instead of an index: a metal, such as "Au", at red, green and blue
     output     file to write, .png, .pdf or .svg; None writes nothing
-    Returns a Drawing, which a notebook shows; `.figure` is Matplotlib's.
+    Returns a Drawing, which a notebook displays; its `figure` is a Matplotlib figure.
     Raises InputError for an invalid material, kind, angle or file.
     """
     if output is not None:
@@ -71,19 +72,19 @@ def plot(
 
 
 def is_tables(text: str | Path) -> bool:
-    """Whether this is a folder of baked tables. Raises InputError if it is not a material either."""
+    """Whether `text` denotes a folder of baked tables. Raises InputError if it denotes neither that nor a material."""
     return operands.kind_of(text, {Kind.TABLES, *operands.MATERIALS}, "MODEL") is Kind.TABLES
 
 
 def _named(given: MaterialLike) -> tuple[str, BSDF]:
     """A material and its label."""
     if isinstance(given, str | Path):
-        operands.kind_of(given, operands.MATERIALS, "MODEL")  # raises an error that names the kind
+        operands.kind_of(given, operands.MATERIALS, "MODEL")  # raises an error that states the kind
     return title_of(given), material(given)
 
 
 def _views(angles: Sequence[float] | None, named: Sequence[tuple[str, BSDF]]) -> tuple[float, ...]:
-    """The plotted viewing angles in degrees, by default angles at which values are known."""
+    """The plotted viewing angles, in degrees; by default, angles at which values are known."""
     known = [bsdf.angular_range.view for _, bsdf in named]
     low, high = min((ends[0] for ends in known), default=0.0), max((ends[1] for ends in known), default=90.0)
     if angles is None:
@@ -122,7 +123,7 @@ def _drawn(materials: Sequence[tuple[str, BSDF]], kind: str, views: Sequence[flo
 
 
 def _known(labels: Sequence[str], bsdfs: Sequence[BSDF]) -> str:
-    """The angles at which values are known, as the end of a subtitle; "" if there is no restriction."""
+    """The angles at which values are known, as text for the end of a subtitle; "" if there is no restriction."""
     parts = [
         f"{label} is known at {bsdf.angular_range}" if len(bsdfs) > 1 else f"known at {bsdf.angular_range}"
         for label, bsdf in zip(labels, bsdfs, strict=True)
@@ -136,7 +137,8 @@ def _shortened(text: str) -> str:
 
 
 def _slice(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
-    """All views of a single material in one frame, or one frame per view of several materials, on the same axes.
+    """Draw all views of a single material in one frame, or one frame per view for several materials, with the same
+    scale.
 
     The scale is logarithmic if the peaks differ by a factor of more than 30.
     """
@@ -222,7 +224,7 @@ def _line(axes: Axes, curve: Curve, color: Color, index: int) -> None:
 
 
 def _frame(axes: Axes, reach: int, step: int, first: int | None = None) -> None:
-    """Angles along x, from -reach or `first`; no frame at the top and on the right."""
+    """Set an x axis of angles from -reach, or `first`, to reach, without a frame at the top and on the right."""
     start = -reach if first is None else first
     axes.set_xlim(start, reach)
     axes.set_xticks(range(start, reach + 1, step))
@@ -235,12 +237,12 @@ def _frame(axes: Axes, reach: int, step: int, first: int | None = None) -> None:
 def _color_of_view(index: int, count: int) -> Color:
     from matplotlib import colormaps
 
-    # Viridis without its yellow end, which is too pale on white.
+    # Viridis without the yellow end, which is too pale on white.
     return colormaps["viridis"](0.08 + 0.72 * index / max(count - 1, 1))
 
 
 def _albedo(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
-    """Directional albedo as a function of the angle of wo, and the limit of energy conservation."""
+    """Draw the directional albedo as a function of the angle of wo, and the limit of energy conservation."""
     known = _known(labels, bsdfs)
     subtitle = "fraction of the power that leaves, over wo"
     subtitle += known or f"; {curves.SAMPLES**2} stratified samples per point"

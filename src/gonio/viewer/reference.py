@@ -6,16 +6,16 @@
     ...     reference.advance()         # more samples of every pixel, about a twentieth of a second
     >>> reference.image()               # (height, width, 4): radiance and coverage
 
-Two kinds of light transport:
+There are two kinds of light transport:
 
 "local"  Direct light, one bounce (depth 2). The balls are in one scene and the lights in another, so that each
-         point is lit by every light without occlusion, and no ball illuminates or shadows another: the result of a
-         fragment shader. Light and BSDF sampling are combined (multiple importance sampling).
-"path"   Balls and lights in one scene, with shadows, interreflection and refraction.
+         point is lit by every light without occlusion, and no ball illuminates or shadows another, as in a fragment
+         shader. Light and BSDF sampling are combined by multiple importance sampling.
+"path"   Balls and lights are in one scene, with shadows, interreflection and refraction.
 
-Pixels are averaged over a box one pixel wide. A changed value compiles nothing: parameters, lights and camera are
-kernel data and are written into the existing scene. Another model, choice, number of balls or kind of light creates a
-new scene.
+Each pixel is averaged over a box one pixel wide. A changed value requires no compilation: parameters, lights and camera
+are kernel data and are written into the existing scene. A different model, choice, number of balls or kind of light
+requires a new scene.
 """
 
 from __future__ import annotations
@@ -42,18 +42,19 @@ from .stage import Stage
 Pixels: TypeAlias = "NDArray[np.float32]"  # (height, width, channels), row 0 on top
 Structure: TypeAlias = tuple[object, ...]  # equal for scenes that share a kernel
 
-PASS_SECONDS = 0.05  # per pass, after which it can be interrupted: half of the allowed latency of a slider
+PASS_SECONDS = 0.05  # duration of a pass, which cannot be interrupted: half of the allowed latency of a slider
 MAX_PER_PASS = 64
 MIN_SECONDS = PASS_SECONDS / MAX_PER_PASS  # per sample, before the first measurement
 
-# Mitsuba's sphere has its axis along z and u from x toward y; the page's has it along y and u from z toward x.
+# Mitsuba's sphere has its axis along z, and u runs from x toward y; the axis of the page's sphere is y, and u runs from
+# z toward x.
 SPHERE_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 
 
 class Reference:
-    """A progressive picture of the page's scene.
+    """A progressively rendered picture of the page's scene.
 
-    what    materials by key, from which the rows of a scene are built
+    what    stage with the materials from which the rows of a scene are built
     device  "cpu", "cuda" or "auto"
     """
 
@@ -86,7 +87,7 @@ class Reference:
         return self._render is None or self.scene is None or self.samples >= self.scene.spp
 
     def show(self, scene: messages.Scene) -> None:
-        """Start a picture. Raises InputError for an unknown material, parameter or environment image."""
+        """Start a new picture. Raises InputError for an unknown material, parameter or environment image."""
         bsdfs = [self._materials(row, f"rows/{index}") for index, row in enumerate(scene.state.rows)]
         balls = self._balls.place(bsdfs, scene.state.spacing)
         lamps = self._lamps.place(scene.state.lights, self.pictures)
@@ -129,7 +130,7 @@ class Reference:
                 "type": "perspective",
                 "fov": camera.fov,
                 "fov_axis": "y",
-                "near_clip": 1e-3,  # the clips are literals of the kernel: other values would compile a new one
+                "near_clip": 1e-3,  # clip distances are literals of the kernel: other values would require a new kernel
                 "far_clip": 1e8,
                 "to_world": mi.ScalarTransform4f().look_at(list(eye), list(target), up),
                 "film": {"type": "hdrfilm", "width": scene.width, "height": scene.height, "rfilter": {"type": "box"}},
@@ -137,11 +138,12 @@ class Reference:
         )
 
     def advance(self) -> None:
-        """Add samples: one at first, so that there is a picture soon; then as many as there are already, within
-        PASS_SECONDS.
+        """Add samples: at first one, so that a picture is available soon; then as many as have been taken already,
+        within PASS_SECONDS.
 
-        In addition to its samples, a pass has an overhead in Python, which the first pass (one sample) measures. If it
-        were ignored, a busy machine would appear to need all its time for one sample, and would never try two.
+        Each pass has an overhead in Python in addition to the time of its samples. The overhead is measured in the
+        first pass, which takes one sample. Without this correction, on a busy machine a single sample would appear to
+        take the whole time of a pass, and the number of samples would never be increased to two.
         """
         if self.done:
             return
@@ -156,11 +158,12 @@ class Reference:
             self._first_pass, self._per_sample = took, MIN_SECONDS
         elif count > 1:
             self._per_sample = max((took - self._first_pass) / (count - 1), MIN_SECONDS)
-        else:  # the delay may be over, so two are soon tried again
+        else:  # the delay may be over, so two samples are soon tried again
             self._per_sample = max(self._per_sample / 2, MIN_SECONDS)
 
     def image(self) -> Pixels:
-        """(height, width, 4) float32: linear radiance of the balls only, averaged over the pixel, and coverage."""
+        """The picture, (height, width, 4) float32: linear radiance of the balls only, averaged over each pixel, and
+        coverage."""
         if self._render is None:
             raise InputError("nothing to show yet", "Reference.image", "call show first")
         return self._render.image()
@@ -170,7 +173,7 @@ class Reference:
 
 
 class _Balls:
-    """The balls' scene, reused as long as only values change."""
+    """The scene of the balls, which is reused as long as only values change."""
 
     def __init__(self, mi: ModuleType):
         self.mi = mi
@@ -205,7 +208,7 @@ class _Balls:
         return self.mi.load_dict({"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world), "bsdf": bsdf})
 
     def _plugin(self, bsdf: BSDF) -> PluginDict:
-        """A material as a plugin, with numbers named by their slots."""
+        """A material as a plugin, whose numeric parameters have the names of their slots."""
         plugin: PluginDict = {"type": adapter.register_model(self.mi, type(bsdf))}
         for name, inner in tree.children(bsdf).items():
             plugin[name] = self._plugin(inner)
@@ -219,8 +222,8 @@ class _Balls:
 
 
 def _slots(bsdf: BSDF) -> dict[str, float | tuple[float, ...]]:
-    """The numbers of a material by the adapter's names: a pair of alphas is alpha_x and alpha_y, rotation 0 has no
-    slot."""
+    """The numeric parameters of a material by the adapter's names: a pair of alphas becomes alpha_x and alpha_y, and a
+    rotation of 0 has no slot."""
     slots: dict[str, float | tuple[float, ...]] = {}
     for path, parameter, value, _ in tree.leaves(bsdf):
         if parameter.kind == "spectrum":
@@ -234,7 +237,7 @@ def _slots(bsdf: BSDF) -> dict[str, float | tuple[float, ...]]:
 
 
 def _structure(bsdf: BSDF) -> Structure:
-    """Everything that determines a material's code: classes, choices, and which numbers there are."""
+    """Everything that determines a material's code: its classes, its choices, and the names of its numeric slots."""
     shape = [(path, type(inner), inner.delta) for path, inner in tree.walk(bsdf)]
     choices = [leaf.value for leaf in tree.leaves(bsdf) if not leaf.parameter.numeric]
     return shape, choices, sorted(_slots(bsdf))
@@ -244,7 +247,7 @@ def _structure(bsdf: BSDF) -> Structure:
 
 
 class _Lamps:
-    """The lights' scene, reused as long as only values change."""
+    """The scene of the lights, which is reused as long as only values change."""
 
     def __init__(self, mi: ModuleType):
         self.mi = mi
@@ -271,8 +274,8 @@ class _Lamps:
         return self._scene
 
     def write(self, scene: Scene, given: Sequence[messages.Light]) -> None:
-        """Write the lights' values into a scene that contains them; through the scene, which then updates its
-        geometry."""
+        """Write the lights' values into a scene that contains the lights. The values are written through the scene, so
+        that it updates its geometry."""
         parameters = self.mi.traverse(scene)
         for n, light in enumerate(given):
             for name, value in self._values(light).items():
@@ -291,13 +294,13 @@ class _Lamps:
                 return {"type": "rectangle", "emitter": {"type": "gonio_area", "radiance": white}}
             case messages.Environment(image=messages.Image(key=key)):
                 picture = pictures[key]
-                if not picture.any():  # no density can be normalized; this value is too dark to be visible
+                if not picture.any():  # a density of 0 cannot be normalized; 1e-20 is too dark to be visible
                     picture = np.full_like(picture, 1e-20)
                 return textures.environment(self.mi, picture)
         return {"type": "constant", "radiance": white}
 
     def _values(self, light: messages.Light) -> dict[str, OfVariant]:
-        """A light's parameters by Mitsuba's names."""
+        """The parameters of a light by Mitsuba's names."""
         mi = self.mi
         match light:
             case messages.Directional():
@@ -317,13 +320,13 @@ class _Lamps:
                 return {"to_world": mi.Transform4f(to_world), "emitter.radiance.value": radiance}
             case messages.Environment(image=None):
                 return {"radiance.value": mi.Color3f(*light.constant) * light.scale}
-        # Half a turn: see textures.environment. Modulo a full turn, since float32 loses precision for large angles.
+        # Half a turn: see textures.environment. Modulo a full turn, because float32 loses precision for large angles.
         turn = mi.Transform4f().rotate([0, 1, 0], math.degrees(light.rotation % math.tau) + 180.0)
         return {"to_world": turn, "scale": float(light.scale)}
 
 
 def _looking(toward: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A rotation from +z to a direction."""
+    """A rotation that maps +z to a direction."""
     side = np.cross([0.0, 1.0, 0.0] if abs(toward[1]) < 0.9 else [1.0, 0.0, 0.0], toward)
     side /= np.linalg.norm(side)
     matrix = np.eye(4)

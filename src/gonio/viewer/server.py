@@ -1,14 +1,18 @@
-"""`gonio view`: the page on this machine's loopback, and the live reference behind it.
+"""`gonio view`: the server of the page, on this machine's loopback address, with the live reference.
 
-There are two routes and no files: `/` returns the page, `/ws` is the socket of docs/viewer.md. Access is restricted:
+The server has two routes and serves no files: `/` returns the page, and `/ws` is the socket described in
+docs/viewer.md. Access is restricted as follows:
 
 - The address contains a random token, without which no request is answered.
-- `Host` must be an address or a name of this machine: a name that an attacker maps here (DNS rebinding) is refused.
-- `Origin` must be this server itself, so that a page elsewhere can neither read nor control it.
-- The page's Content-Security-Policy allows only its own script, and connections to its socket only.
-- Sizes are bounded: requests, messages, uploads, connections, sessions, and pending frames (one).
+- `Host` must be an address or a name of this machine. A name that an attacker maps to this machine (DNS rebinding) is
+  refused.
+- `Origin` must be this server itself, so that pages from elsewhere can neither read nor control it.
+- The page's Content-Security-Policy allows only the page's own script, and connections only to its socket.
+- The sizes of requests, messages and uploads and the numbers of connections, sessions and pending frames (one) are
+  limited.
 
-One thread renders. Sessions alternate in short passes, so that a new scene does not wait long for an older one.
+A single thread renders, alternating between sessions in short passes, so that a new scene does not wait long for an
+older one.
 """
 
 from __future__ import annotations
@@ -46,12 +50,13 @@ from .watch import Watch
 
 LOOPBACK = "127.0.0.1"
 MAX_SESSIONS = 8  # each holds a scene and a picture in memory
-# Limit for a frame to be acknowledged: a page in a hidden tab draws nothing, and may not return. Also for a first
-# request: a page that shows a single term, which the reference cannot, requests nothing.
+# Time limit for the acknowledgment of a frame: a page in a hidden tab draws nothing, and may never be shown again. The
+# same limit applies to the first request: a page that shows a single term, which the reference does not support,
+# requests nothing.
 STALL_SECONDS = 600.0
-FULL_SECONDS = 1.0  # delay before a new page is told that all places are taken
-MAX_WAITING = 200  # new pages in that delay
-PATIENCE_SECONDS = 5.0  # limit for acknowledging a frame while another page needs the place
+FULL_SECONDS = 1.0  # delay before a new page is refused because all sessions are in use
+MAX_WAITING = 200  # largest number of new pages that wait for this delay
+PATIENCE_SECONDS = 5.0  # time limit for acknowledging a frame while another page needs the session
 
 HEADERS = {
     "Cache-Control": "no-store",
@@ -68,7 +73,7 @@ HEADERS = {
 class Application:
     """The page and its socket, for one stage.
 
-    what    the stage that is shown
+    what    the stage to show
     access  conditions of access
     device  device of the reference: "cpu", "cuda" or "auto"
     """
@@ -119,7 +124,7 @@ class Application:
         return HTMLResponse(self._html, headers={**HEADERS, "Content-Security-Policy": policy})
 
     async def talk(self, websocket: WebSocket) -> None:
-        """A session: from its first message to its end."""
+        """Run a session, from its first message to its end."""
         if self.access.refusal(websocket.headers, websocket.scope["query_string"], needs_origin=True):
             await websocket.close(guards.REFUSED)  # before it is accepted: the handshake is answered with 403
             return
@@ -148,7 +153,8 @@ class Application:
             self.renderer.forget(session)
 
     def _make_room(self) -> bool:
-        """Whether one more session fits. Sessions that request or receive nothing are ended, the oldest first."""
+        """Whether another session is possible. A session that requests or receives nothing is ended if necessary, the
+        oldest first."""
         if len(self.sessions) < MAX_SESSIONS:
             return True
         idle = next((session for session in self.sessions if session.idle_for() > PATIENCE_SECONDS), None)
@@ -164,7 +170,7 @@ async def _nothing_here(request: Request, error: Exception) -> Response:
 
 
 class Server(uvicorn.Server):
-    """uvicorn with the limits of `guards`, which prints its address and opens the browser once it is running."""
+    """uvicorn with the limits of `guards`. Once it is running, it prints its address and opens the browser."""
 
     def __init__(self, application: Application, host: str, port: int, browser: bool = False, quiet: bool = False):
         self.application, self.browser, self.quiet, self.as_json = application, browser, quiet, False
@@ -193,7 +199,7 @@ class Server(uvicorn.Server):
 
     @property
     def address(self) -> str:
-        """The address on which it listens, resolved if the host is a name."""
+        """The address on which the server listens; a host name is resolved."""
         return str(self.listener.getsockname()[0])
 
     @property
@@ -211,7 +217,7 @@ class Server(uvicorn.Server):
         if self.application.watch:
             self.application.watch.start()
         if not self.quiet:
-            print(json.dumps({"url": self.url}) if self.as_json else f"{self.url}\nCtrl-C ends it", flush=True)
+            print(json.dumps({"url": self.url}) if self.as_json else f"{self.url}\nPress Ctrl-C to stop", flush=True)
         if self.browser:
             # some browsers block the caller until they are closed
             self._redirect = _redirect_file(self.url)
@@ -231,7 +237,8 @@ class Server(uvicorn.Server):
                 self.run(sockets=[self.listener])
         finally:
             self.listener.close()
-            # Wait for the thread, since ending it during a kernel crashes; a second Ctrl-C must not interrupt this.
+            # Wait for the thread, because ending it during a kernel causes a crash; a second Ctrl-C must not interrupt
+            # the wait.
             with _ignoring_interrupts():
                 if self.application.watch:
                     self.application.watch.stop()
@@ -240,7 +247,7 @@ class Server(uvicorn.Server):
 
 @contextlib.contextmanager
 def _ignoring_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C in the block; only the main thread receives it."""
+    """Ignore Ctrl-C in the `with` block. Only the main thread receives Ctrl-C."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -252,7 +259,7 @@ def _ignoring_interrupts() -> Iterator[None]:
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    """A listening socket; MachineError if that fails."""
+    """A listening socket. Raises MachineError if the port cannot be opened."""
     if not re.fullmatch(r"[\w.:-]+", host, re.ASCII):  # "" would mean every address
         raise InputError(f"'{host}' is not an address", "--host", "give one of this machine, such as 127.0.0.1 or ::1")
     listener = None
@@ -272,7 +279,7 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def _redirect_file(url: str) -> Path:
-    """A file that only this user can read, and that redirects a browser to the page. The token must not appear in a
+    """A file that redirects a browser to the page and can be read only by this user. The token must not appear on a
     command line, which every user of the machine can read."""
     handle, name = tempfile.mkstemp(prefix="gonio-", suffix=".html")  # with mode 0600
     with open(handle, "w", encoding="utf-8") as file:
@@ -296,13 +303,13 @@ def serve(
 ) -> None:
     """Show a stage until Ctrl-C.
 
-    host     address to listen on; with an address other than a loopback address the page is open to the network, which
-             a printed line states
-    port     port to listen on; 0 selects any free one
+    host     address to listen on; with an address other than a loopback address, the page is open to the network, and a
+             warning is printed
+    port     port to listen on; 0 selects any free port
     browser  whether to open the page in a browser
     device   device of the reference: "cpu", "cuda" or "auto"
     as_json  whether to print the address as {"url": ...}
-    Raises MachineError if the port is taken or the device missing, InputError if a model cannot be shown.
+    Raises MachineError if the port is in use or the device is missing, InputError if a model cannot be shown.
     """
     if not 0 <= port < 65536:
         raise InputError(f"port {port}", "--port", "give 0 to 65535")

@@ -1,4 +1,4 @@
-"""A connected page, and the thread that renders for all pages."""
+"""The session of a connected page, and the thread that renders for all pages."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from . import messages, page
 from .reference import Pixels, Reference
 from .stage import Stage
 
-PICTURES = 2  # environments stored per session: the one shown and the next one
-HIDDEN_SECONDS = 1.0  # delay after which a page that has not taken a frame counts as hidden, and rendering waits for it
+PICTURES = 2  # environments stored per session: the current one and the next one
+HIDDEN_SECONDS = 1.0  # time without an acknowledged frame after which a page counts as hidden, and rendering pauses
 MAX_SPARE = 4  # references stored for later pages
 MAX_WISHES = 16  # pending shaders per session
-RATE = 250.0  # messages read per second and page: a page sends one per drawn picture and one per received frame
+RATE = 250.0  # messages per second read from a page, which sends one per drawn picture and one per received frame
 SHARE = 0.1  # fraction of the server thread's time for reading one page's messages
 NONSENSE_SECONDS = 0.005  # time of the server's thread charged for an invalid message, which pages never send
-BURST_SECONDS = 0.5  # credit of a page that was silent: 125 messages at once
-GIVE_WAY_SECONDS = 5e-4  # pause after each pass so that other threads get the lock, which is not fair
-MAX_WAITING = 64  # messages to a page that does not read them: answers to its messages, and one frame
+BURST_SECONDS = 0.5  # credit of a page that has sent no messages: 125 messages at once
+GIVE_WAY_SECONDS = 5e-4  # pause after each pass, so that other threads can acquire the lock, which is not fair
+MAX_WAITING = 64  # messages queued for a page that does not read them: answers to its messages, and one frame
 
 
 class Session:
-    """A connected page: its latest request, and the frame in transit."""
+    """The session of a connected page: its latest request, and the frame in transit."""
 
     def __init__(self, websocket: WebSocket, renderer: Renderer):
         self.websocket, self.renderer = websocket, renderer
         self.loop = asyncio.get_running_loop()
-        self.asked = False  # whether it has sent a valid request
+        self.asked = False  # whether the page has sent a valid request
         self.sent = self.acknowledged = 0  # numbers of frames
         self.stalled_since: float | None = None
         self._outbox: asyncio.Queue[str | bytes] = asyncio.Queue()
@@ -60,7 +60,7 @@ class Session:
     async def run(self, stall_seconds: float) -> None:
         """Exchange messages until one side ends the session.
 
-        stall_seconds  limit for the first request, and for the acknowledgment of a frame
+        stall_seconds  time limit for the first request, and for the acknowledgment of a frame
         """
         work = (self._read(), self._write(), self._watch(stall_seconds), self._ended.wait())
         tasks = [asyncio.create_task(coroutine) for coroutine in work]
@@ -103,7 +103,7 @@ class Session:
             await self._pace(time.thread_time() - began + more)
 
     async def _pace(self, took: float) -> None:
-        """Delay messages that arrive faster than RATE, or use more than SHARE of this thread.
+        """Delay messages that arrive faster than RATE or use more than the fraction SHARE of this thread's time.
 
         took  CPU seconds of the last message
         """
@@ -134,7 +134,7 @@ class Session:
         self.renderer.keep_picture(self, upload.key, pixels)
 
     def send(self, message: str | bytes) -> None:
-        """Queue a message; if too many are waiting, end the session of a page that reads none."""
+        """Queue a message. If too many messages are queued, end the session, because the page does not read them."""
         if self._outbox.qsize() >= MAX_WAITING:
             self.end(1008, "answers are not taken")
         else:
@@ -160,15 +160,15 @@ class Session:
     # ------------------------------------------------------------------ from the renderer's thread
 
     def send_from_thread(self, message: str | bytes) -> None:
-        """As `send`, from another thread; the event loop may have ended."""
+        """As `send`, from another thread. The event loop may have ended."""
         with contextlib.suppress(RuntimeError):
             self.loop.call_soon_threadsafe(self.send, message)
 
 
 class Renderer:
-    """The rendering thread: short passes, and shaders, with equal time for all sessions.
+    """The rendering thread, which renders short passes and writes shaders, with equal time for all sessions.
 
-    what    materials by key
+    what    stage with the materials
     device  "cpu", "cuda" or "auto"
     """
 
@@ -180,11 +180,11 @@ class Renderer:
         self._spare: list[Reference] = []  # of ended sessions, for reuse by new pages
         self._lock = threading.Condition()
         self._running = False
-        self._clock = 0.0  # least time spent on a session that has work
+        self._clock = 0.0  # shortest time spent on a session with pending work
         self._thread: threading.Thread | None = None
 
     def renew(self, what: Stage) -> None:
-        """Render another stage from now on; pending requests for the old one are dropped."""
+        """Render another stage from now on. Pending requests for the old stage are dropped."""
         with self._lock:
             self.stage = what
             self.revision += 1
@@ -195,7 +195,7 @@ class Renderer:
     # ------------------------------------------------------------------ requests of sessions
 
     def show(self, session: Session, scene: messages.Scene) -> None:
-        """Render a scene for a session, in place of its earlier one; a scene of an older stage is ignored."""
+        """Render a scene for a session, in place of its previous scene. A scene of an older stage is ignored."""
         with self._lock:
             if scene.revision != self.revision:
                 return
@@ -213,7 +213,7 @@ class Renderer:
                 session.pictures.pop(next(iter(session.pictures)))
 
     def request_variant(self, session: Session, wish: messages.Wish) -> None:
-        """Write a shader with other choices and send it."""
+        """Write a shader with other choices, and send it to the page."""
         if wish.revision != self.revision:
             return  # the page will request it again
         if wish.material not in self.stage.materials:
@@ -227,7 +227,7 @@ class Renderer:
             self._lock.notify()
 
     def wake(self) -> None:
-        """Let the thread continue, since a frame was acknowledged and the next one may be made."""
+        """Wake the thread, because a frame was acknowledged and the next one may be rendered."""
         with self._lock:
             self._lock.notify()
 
@@ -289,7 +289,8 @@ class Renderer:
     def _next(self, ready: list[Session]) -> Session:
         """The session that has used the least of the thread's time, so that large pictures do not delay small ones.
 
-        Idle time gives no credit: a returning session starts at the level of the others (start-time fair queueing).
+        Idle time gives no credit: a session that becomes active again starts at the level of the others (start-time
+        fair queueing).
         """
         chosen = min(ready, key=lambda session: max(session.spent, self._clock))
         self._clock = chosen.spent = max(chosen.spent, self._clock)
@@ -303,7 +304,7 @@ class Renderer:
         session.send_from_thread(messages.failure(error))
 
     def _turn(self, session: Session, scene: messages.Scene) -> None:
-        """One pass of a scene for a session, and a frame if the page is ready for one."""
+        """Render one pass of a scene for a session, and send a frame if the page is ready for one."""
         with self._lock:
             reference = session.reference
             pictures = dict(session.pictures)
@@ -316,7 +317,7 @@ class Renderer:
             ready = {"type": "ready", "device": reference.device, "version": __version__, "limits": limits}
             session.send_from_thread(json.dumps(ready))
             _give_way()
-        with engine.using(reference.variant):  # a program that shows the page may have set another one
+        with engine.using(reference.variant):  # the program that serves the page may have set another variant
             if reference.scene is not scene:
                 reference.stage, reference.pictures = stage, pictures
                 reference.show(scene)
@@ -351,13 +352,13 @@ def _give_way() -> None:
 
 
 def _worth_showing(reference: Reference, shown: int) -> bool:
-    """Whether to send a picture: the first at once, then after a quarter more samples, and the finished one."""
+    """Whether to send a picture: the first one immediately, further ones after 25 % more samples, and the final one."""
     samples = reference.samples
     return samples > shown and (reference.done or samples >= 1.25 * shown)
 
 
 def _has_work(session: Session) -> bool:
-    """Whether samples are missing, or a finished picture has not been sent, for a page that acknowledges frames."""
+    """Whether a page that acknowledges frames needs more samples, or has not received the final picture."""
     reference = session.reference
     if session.scene is None or session.idle_for() > HIDDEN_SECONDS:
         return False

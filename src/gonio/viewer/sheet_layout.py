@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Pixels = NDArray[np.uint8]  # (H, W, 3)
 MAX_WIDTH = 3200  # pixels; the pictures of larger sheets are scaled down
-READABLE = 800  # width in pixels at which a page shows a sheet; the type of wider sheets is scaled up with them
+READABLE = 800  # width in pixels at which a page shows a sheet; the text of wider sheets is enlarged in proportion
 GAP, MARGIN = 8, 20
 TITLE_HEIGHT, HEADING_HEIGHT, NAME_HEIGHT, LABEL_HEIGHT, BETWEEN = 62, 28, 20, 22, 14
 _DPI = 100
@@ -41,8 +41,9 @@ class _Block:
 def draw(pictures: Sequence[Pixels], variations: Sequence[Variation], title: str, subtitle: str) -> Drawing:
     """Lay out 8-bit pictures (in the order of `itertools.product`) with labels.
 
-    One variation: a row, wrapped if it is long. Two: rows by the first, columns by the second. More: a grid of the
-    last two for every combination of the others.
+    One variation gives a row, which is wrapped if it is long. With two variations, the rows correspond to the first and
+    the columns to the second. With more variations, there is a grid of the last two for every combination of the
+    others.
     """
     matplotlib = figures.load_matplotlib()
 
@@ -80,7 +81,8 @@ def _blocks(pictures: Sequence[Pixels], variations: Sequence[Variation]) -> list
 
 
 def _columns_of_a_row(count: int, aspect: float) -> int:
-    """The number of columns whose sheet is closest to 16 by 10, without a nearly empty last row."""
+    """The number of columns for which the aspect ratio of the sheet is closest to 16 : 10, without a nearly empty last
+    row."""
 
     def badness(columns: int) -> float:
         rows = math.ceil(count / columns)
@@ -94,7 +96,7 @@ def _columns_of_a_row(count: int, aspect: float) -> int:
 class _Layout:
     """The dimensions of a sheet in pixels.
 
-    zoom     scale factor of the type and of the space that it takes
+    zoom     scale factor of the text and of the space for it
     left     left edge of the first column of pictures
     cell     width and height of a picture
     pitch    distance between columns

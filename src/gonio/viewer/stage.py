@@ -1,7 +1,7 @@
 """The content of a page: materials on balls, lights, and the camera.
 
-A `Stage` is built from models (`of_models`) or from a lab scene (`lab_scene.stage`), or it is the homework's two rows
-(`homework`). `page.py` converts it to the page's data, `reference.py` renders it.
+A `Stage` is built from models (`of_models`) or from a scene (`lab_scene.stage`), or consists of the two rows of the
+homework (`homework`). `page.py` converts it to the page's data, and `reference.py` renders it.
 
 Values of nested materials have paths: "base.alpha" is the alpha of the material `base`.
 """
@@ -30,7 +30,7 @@ Light: TypeAlias = "dict[str, object]"  # described in docs/viewer.md
 
 
 class Camera(TypedDict):
-    """A camera as described in docs/viewer.md; without a distance, all balls are in view."""
+    """A camera, as described in docs/viewer.md. Without a distance, all balls are in view."""
 
     target: list[float]
     azimuth: float
@@ -40,7 +40,7 @@ class Camera(TypedDict):
 
 
 ROUGHNESS = (0.15, 0.35, 0.55, 0.75, 0.95)  # roughness of the homework's balls; alpha is its square
-# the homework's masking and the exact one; the page toggles between them
+# the homework's masking term and the exact one, between which the page switches
 HOMEWORK_MASKINGS = ("smith-correlated", "schlick-direct")
 LARGEST_ROW = 5
 
@@ -60,7 +60,7 @@ SPACING = 2.4
 
 @dataclass(frozen=True)
 class Ball:
-    """One ball: its label, and the numeric parameters that differ from its material's, path -> value."""
+    """One ball: its label, and the numeric parameters that differ from those of its material, path -> value."""
 
     label: str
     values: Mapping[str, Value] = field(default_factory=dict)
@@ -79,7 +79,7 @@ class Row:
 class Material:
     """A model with the initial values of its balls.
 
-    choices  options offered as a toggle: path of a choice -> its names, the model's own first
+    choices  options between which the page switches: path of a choice -> its names, the model's own first
     """
 
     title: str
@@ -91,7 +91,7 @@ class Material:
 class Stage:
     """Materials by key, rows from top to bottom, lights and camera as described in docs/viewer.md.
 
-    code  the user's files that it was built from, to rebuild it when one of them is saved
+    code  the user's files from which the stage was built, to rebuild it when one of them is saved
     """
 
     title: str
@@ -105,7 +105,7 @@ class Stage:
     def framed(self) -> Camera:
         """The camera, at a distance from which all balls fit into a picture of 16 : 9 or wider, with a margin.
 
-        The page preserves the horizontal field of view in narrower pictures, so all balls fit into these too.
+        The page preserves the horizontal field of view in narrower pictures, so all balls fit into these, too.
         """
         across = (max(len(row.balls) for row in self.rows) - 1) * SPACING / 2 + 1.25
         up = (len(self.rows) - 1) * SPACING / 2 + 1.25
@@ -118,7 +118,7 @@ class Stage:
 
 
 def replaced(bsdf: BSDF, values: Mapping[str, Value], location: str = "values") -> BSDF:
-    """The material with other values at some paths. Raises InputError, which names `location`, for an invalid path or
+    """The material with other values at some paths. Raises InputError with the given `location` for an invalid path or
     value."""
     known = {leaf.path: leaf.parameter for leaf in tree.leaves(bsdf)}
     for path in values:
@@ -128,7 +128,7 @@ def replaced(bsdf: BSDF, values: Mapping[str, Value], location: str = "values") 
 
 
 def _plain(parameter: Parameter, value: Value) -> Value:
-    """A value from JSON for a constructor: two equal alphas become one, a list becomes a tuple."""
+    """A value from JSON in the form for a constructor: two equal alphas become one, and a list becomes a tuple."""
     if isinstance(value, list | tuple):
         if parameter.kind == "alpha" and len(value) == 2 and value[0] == value[1]:
             return value[0]
@@ -140,7 +140,7 @@ def _plain(parameter: Parameter, value: Value) -> Value:
 
 
 class PresetData(TypedDict):
-    """A preset in the page's format: values by path, linear reflectance at normal incidence."""
+    """A preset in the page's format: values by path, and the linear reflectance at normal incidence."""
 
     name: str
     set: dict[str, Value]
@@ -148,10 +148,12 @@ class PresetData(TypedDict):
 
 
 def presets(bsdf: BSDF) -> list[PresetData]:
-    """The presets of the first nested material that has some, each with its linear F0 at normal incidence.
+    """The presets of the first nested material that has presets, each with its linear F0, the reflectance at normal
+    incidence.
 
-    F0 is exact, in linear values; values picked from sRGB pictures are too dark. Presets without a surface, whose F0 is
-    0, are omitted; defaults that reflect everything, at every angle, are last.
+    F0 is computed by the exact formula, in linear values; values picked from sRGB pictures are too dark. Presets
+    without a surface, whose F0 is 0, are omitted. If the default values reflect all light at every angle, they are
+    listed last.
     """
     path, owner = next(((path, inner) for path, inner in tree.walk(bsdf) if inner.presets()), ("", bsdf))
     listed: list[PresetData] = []
@@ -207,15 +209,15 @@ def opening() -> Stage:
 
 
 RIM = (
-    "the low roughness of the upper row has a false rim: with k = (roughness + 1)^2 / 8 masking does not vanish on a "
-    "smooth surface (E_avg is 0.835 at roughness 0.05), and compensation returns what is not lost; schlick-ibl, "
-    "k = alpha / 2, has no such rim"
+    "balls of low roughness in the upper row have a false rim: with k = (roughness + 1)^2 / 8, masking does not vanish "
+    "on a smooth surface (E_avg is 0.835 at roughness 0.05), and the compensation adds light that was not lost; "
+    "schlick-ibl, k = alpha / 2, causes no such rim"
 )
 
 
 def homework_text(metal: str = "Ag") -> Stage:
-    """The homework's two rows with the terms of its text: GGX, Schlick's F, k = (roughness + 1)^2 / 8, and f_add as on
-    its sheet with F_avg from the fit of Kulla2017; roughness increases to the left, as in the homework."""
+    """The two rows of the homework with the terms of its text: GGX, Schlick's F, k = (roughness + 1)^2 / 8, and f_add
+    as on its sheet, with F_avg from the fit of Kulla2017. Roughness increases to the left, as in the homework."""
     terms = {"masking": "schlick-direct", "fresnel": "schlick", "alpha": ROUGHNESS[0] ** 2}
     base = model("conductor").preset(metal, **terms)
     compensated = model("kulla-conty")(base=base, color="sheet", average="imageworks")  # type: ignore[call-arg]
@@ -246,7 +248,7 @@ def _short(x: float) -> str:
 def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
     """A stage of models by their names on the command line: "conductor", "conductor(alpha=0.2)", "glass.py:Glass".
 
-    parameters  "name=value" each, for every model that has the parameter
+    parameters  settings "name=value", each of which is applied to every model that has the parameter
     Raises InputError for a parameter that no model has.
     """
     files = [file for target in (*targets, *parameters) for file in outside.files_in(target)]
@@ -263,7 +265,7 @@ def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
 
 
 def shown(targets: Sequence[str], parameters: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
-    """`targets.named` for materials that a page can show. Raises InputError for anything else."""
+    """`targets.named`, for materials that a page can show. Raises InputError for all other targets."""
     for target in targets:
         if operands.MATERIALS.isdisjoint(operands.readings(target)):
             hint = "the page needs shader code, which only Gonio's models have"
@@ -306,7 +308,7 @@ def _title(bsdf: BSDF) -> str:
 
 
 def _masking(bsdf: BSDF) -> tuple[str, tuple[str, ...]]:
-    """The first masking term, and the options of its toggle: the model's own, then the homework's two."""
+    """The path of the first masking term, and its options: the model's own term, then the two terms of the homework."""
     for path, parameter, own, _ in tree.leaves(bsdf):
         if parameter.name == "masking" and parameter.choices:
             others = (name for name in HOMEWORK_MASKINGS if name != own and _accepts(bsdf, {path: name}))
@@ -325,8 +327,8 @@ def _accepts(bsdf: BSDF, values: Mapping[str, Value]) -> bool:
 def _mains(free: Sequence[Sequence[Leaf]]) -> list[Leaf | None]:
     """For each row, the parameter that varies along its balls, or None.
 
-    Rows with the same material, one of them nested in another, vary the same parameter: an alpha, otherwise the
-    parameter of another row.
+    If a material occurs in one row and is nested in the material of another, both rows vary the same parameter: an
+    alpha or, if there is none, the parameter of the other row.
     """
     mains = [_main(leaves) for leaves in free]
     names = {main.path for main in mains if main is not None}
@@ -339,7 +341,7 @@ def _mains(free: Sequence[Sequence[Leaf]]) -> list[Leaf | None]:
 
 
 def _main(leaves: Sequence[Leaf]) -> Leaf | None:
-    """The first alpha, else the first number, else the first color that is not one of several in a preset."""
+    """The first alpha; otherwise, the first number; otherwise, the first color that no preset sets."""
     for leaf in leaves:
         if leaf.parameter.kind == "alpha" and not isinstance(leaf.value, tuple):
             return leaf
@@ -354,7 +356,7 @@ def _main(leaves: Sequence[Leaf]) -> Leaf | None:
 
 
 def _series(main: Leaf) -> tuple[Ball, ...]:
-    """Balls over the range of a parameter."""
+    """Balls that cover the range of a parameter."""
     path, parameter, value, _ = main
     if parameter.kind == "alpha":
         return tuple(_rough(path, r) for r in ROUGHNESS)

@@ -1,8 +1,8 @@
-"""Materials named on the command line, with options shared by all: -p masking=schlick-direct.
+"""Materials named on the command line, with shared options such as -p masking=schlick-direct.
 
-A shared option is applied to every material that has the parameter, including nested materials: otherwise a comparison
-would be misleading, since one row would have it and another silently would not. Where the parameter is ambiguous, the
-option is not applied, and a note says so.
+A shared option is applied to every material that has the parameter, including nested materials. Otherwise, a comparison
+would be misleading, because the option would affect some rows but not others. Where the parameter is ambiguous, the
+option is not applied, and a note states this.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ class Named(NamedTuple):
 def named(targets: Sequence[str], options: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
     """The materials, and notes about options that were not applied to one of them.
 
-    options  "name=value" each, shared by all. A material's own parameter has precedence over nested ones of that name;
-             a choice, such as masking, is applied to all nested ones, a number or a preset only if there is exactly one
+    options  options shared by all materials, each "name=value". A material's own parameter takes precedence over nested
+             parameters of the same name; a choice, such as masking, is applied to all nested parameters, a number or a
+             preset only if there is exactly one
     Raises InputError for an option that applies to no material.
     """
     shared = dict(map(notation.assignment, options))
@@ -79,7 +80,7 @@ def _places(bsdf: BSDF, name: str) -> list[str]:
 
 
 def _clear(bsdf: BSDF, places: Sequence[str]) -> bool:
-    """Whether an option may be set at all of these places."""
+    """Whether an option may be set at all of these paths."""
     leaves = {leaf.path: leaf.parameter for leaf in tree.leaves(bsdf)}
     return len(places) < 2 or all(place in leaves and not leaves[place].numeric for place in places)
 
@@ -104,7 +105,7 @@ def _with(one: Named, places: Sequence[str], value: str) -> Named:
 
 
 def _values(inner: BSDF, name: str, value: str) -> dict[str, object]:
-    """The values that an option sets for a material, by name."""
+    """The values to which an option sets the parameters of a material, by name."""
     if name in inner.parameters():
         return {name: notation.typed(inner.parameters()[name], value)}
     chosen = type(inner).preset(value)
@@ -112,7 +113,7 @@ def _values(inner: BSDF, name: str, value: str) -> dict[str, object]:
 
 
 def _paths(cls: type[BSDF], settings: Mapping[str, object]) -> set[str]:
-    """The paths that settings set, including those of nested materials."""
+    """The paths of the parameters in `settings`, including those of nested materials."""
     paths = set()
     for name, value in settings.items():
         parameter = cls.parameters().get(name)
@@ -124,7 +125,7 @@ def _paths(cls: type[BSDF], settings: Mapping[str, object]) -> set[str]:
 
 
 def _inside(value: object) -> tuple[type[BSDF], dict[str, object]]:
-    """Class and settings of a nested material, which `notation.made` has accepted before."""
+    """Class and settings of a nested material that `notation.made` has accepted."""
     if isinstance(value, str) and not value.lstrip().startswith("{"):
         return notation.taken_apart(value.strip().strip('"'))
     if isinstance(value, str):

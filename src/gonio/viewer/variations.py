@@ -19,10 +19,11 @@ _RANGE = re.compile(r"[-+\d.eE]*\d\.\.[-+\d.eE]+")  # a range of numbers; file p
 
 @dataclass(frozen=True)
 class Variation:
-    """One --vary: a path into the scene or a material, or a $parameter of a Mitsuba XML, and its values.
+    """The content of one --vary: a path in the scene or in a material, or a $parameter of a Mitsuba XML file, and its
+    values.
 
-    path    one path, or several that vary together, separated by commas: "kd,ks"
-    values  one per picture; for several paths, a tuple with a value for each
+    path    one path, or several paths that vary together, separated by commas: "kd,ks"
+    values  one value per picture; for several paths, each value is a tuple with one entry per path
     """
 
     path: str
@@ -38,7 +39,7 @@ class Variation:
         return ", ".join(map(_last_word, self.paths))
 
     def settings(self, value: Any) -> dict[str, object]:
-        """The settings of one of the values, by path."""
+        """The settings that a value of the variation represents, by path."""
         return dict(zip(self.paths, value if len(self.paths) > 1 else (value,), strict=True))
 
 
@@ -51,9 +52,9 @@ def _last_word(path: str) -> str:
 
 
 def parse_variation(text: str) -> Variation:
-    """A `Variation` from "shapes.0.material.p=4,16,64", or with several paths, from "kd,ks=(0.2,0.8),(0.5,0.5)".
+    """A `Variation` from "shapes.0.material.p=4,16,64" or, with several paths, from "kd,ks=(0.2,0.8),(0.5,0.5)".
 
-    Values are JSON; commas in brackets do not separate. "0.1..1" is a range of five values.
+    Values are JSON; commas in brackets do not separate values. "0.1..1" is a range of five values.
     """
     paths, values = notation.assignment(text, "--vary")
     if _RANGE.fullmatch(values):
@@ -62,8 +63,9 @@ def parse_variation(text: str) -> Variation:
 
 
 def variation(paths: str | Sequence[str], values: Sequence[object]) -> Variation:
-    """A `Variation` of one path, or of several that vary together, "kd,ks" or ("kd", "ks"): each value then has one
-    component per path, (0.2, 0.8) or "(0.2,0.8)". Raises InputError if it has more or fewer."""
+    """A `Variation` of one path, or of several paths that vary together, "kd,ks" or ("kd", "ks"). In the latter case,
+    each value has one component per path, (0.2, 0.8) or "(0.2,0.8)". Raises InputError for another number of
+    components."""
     names = tuple(path.strip() for path in (paths.split(",") if isinstance(paths, str) else paths))
     if not all(names) or len(set(names)) < len(names):
         what, hint = f"'{','.join(names)}' varies no path, or one twice", "such as kd,ks=(0.2,0.8),(0.5,0.5)"
@@ -89,7 +91,8 @@ def _together(value: object, names: Sequence[str]) -> tuple[object, ...]:
 
 
 def with_cell(request: Request, cell: Mapping[str, object], named: notation.Settings | None) -> Request:
-    """The request with one cell's values, which belong to the scene, or to a material and the scene that shows it."""
+    """The request with the values of one cell, which are values of the scene, or of a material and of the scene that
+    shows it."""
     if named is None:
         return replace(request, overrides={**request.overrides, **cell})
     cls, given = named

@@ -1,11 +1,11 @@
-"""Reload a user's own files whenever they are saved.
+"""Reloading of a user's files whenever they are saved.
 
     >>> code = Code([Path("ward.py")], make)
     >>> stage = code.run()                   # `make()`, which loads the files and their imports from their folder
     >>> Watch(code, show, complain).start()  # and again after each change
 
-Each run starts without the modules of the previous one, so that a saved change in any of them takes effect, and an old
-module is freed with the materials made from it.
+Each run starts without the modules of the previous run, so that a saved change in any module takes effect, and an old
+module is freed together with the materials created from it.
 """
 
 from __future__ import annotations
@@ -25,17 +25,19 @@ from ..errors import GonioError
 
 POLL_SECONDS = 0.03
 STOP_SECONDS = 5.0
-MISSING_POLLS = 10  # some editors delete a file and write it again, so a file may be missing that long
+MISSING_POLLS = 10  # number of polls for which a file may be missing: some editors delete a file before they write it
 
 Made = TypeVar("Made")
 Stamp = tuple[int, int, int] | None  # modification time, size, inode; None for a missing file
 
 
 class Code(Generic[Made]):
-    """Python files that the user named, those that they import from their own folders, and the object made from them.
+    """Python files named by the user, the files that they import from their own folders, and the object created from
+    these files.
 
-    make   loads the files
-    texts  shaders that the user named: watched with the files they include, but nothing is imported from their folders
+    make   function that loads the files
+    texts  shaders named by the user, which are watched together with the files that they include; nothing is imported
+           from their folders
     files  all of these files, as of the last run
     """
 
@@ -62,20 +64,20 @@ class Code(Generic[Made]):
             with self._importable():
                 made = self._make()
         except BaseException:
-            # The imports of a failed file are unknown: any file in its folder may fix it.
+            # The imports of a failed file are unknown: a change of any file in its folder may correct the error.
             self._follow(others, {path for folder in self._folders for path in folder.glob("*.py")} | self.files)
             raise
         self._follow(others, set())
         return made
 
     def look(self) -> dict[Path, Stamp]:
-        """The stamps that show whether a file was saved."""
+        """The stamps of all files, which change when a file is saved."""
         return {path: _stamp(path) for path in self.files}
 
     @contextlib.contextmanager
     def _importable(self) -> Iterator[None]:
-        """Add the folders to Python's path, and write no bytecode, which Python would also use for a file of the same
-        size saved within the same second."""
+        """Add the folders to Python's path, and write no bytecode. Python would also use the bytecode for another
+        version of the file that has the same size and was saved within the same second."""
         path, keeps = list(sys.path), sys.dont_write_bytecode
         sys.path[:0] = sorted(map(str, self._folders))
         sys.dont_write_bytecode = True
@@ -85,7 +87,7 @@ class Code(Generic[Made]):
             sys.path[:], sys.dont_write_bytecode = path, keeps
 
     def _follow(self, others: set[str], more: set[Path]) -> None:
-        """Record the modules that the files loaded: those in their folders that nothing else had loaded."""
+        """Record the modules that the files have loaded: the modules in their folders that were not loaded before."""
         packages = {name.partition(".")[0] for name in others}
         new = {name: module for name, module in sys.modules.items() if name.partition(".")[0] not in packages}
         files = {name: getattr(module, "__file__", None) for name, module in new.items()}
@@ -101,7 +103,7 @@ class Code(Generic[Made]):
         return not {"site-packages", "dist-packages"} & {*place.parts} and not self._folders.isdisjoint(place.parents)
 
     def located(self, error: BaseException) -> GonioError:
-        """The error, with the line of these files that caused it."""
+        """The error, with the line in these files that caused it."""
         causes = list(_causes(error))
         first = causes[-1]
         if isinstance(first, SyntaxError) and first.filename:
@@ -124,7 +126,7 @@ class Code(Generic[Made]):
         return GonioError(f"{type(error).__name__}: {text}", place, "fix it and save the file")
 
     def _line(self, traceback: TracebackType | None) -> str:
-        """file:line of the innermost call in these files, "" if there is none."""
+        """The innermost call in these files, as file:line; "" if there is none."""
         line = ""
         while traceback is not None:
             place = Path(traceback.tb_frame.f_code.co_filename)
@@ -151,7 +153,7 @@ def _stamp(path: Path) -> Stamp:
 
 
 class Watch(Generic[Made]):
-    """A thread that runs the code again whenever one of its files was saved.
+    """A thread that runs the code again whenever one of its files is saved.
 
     show      called with the result
     complain  called with an error of the code or of `show`, with its location
@@ -177,7 +179,7 @@ class Watch(Generic[Made]):
             now = self._code.look()
             quiet = quiet + 1 if now == before else 0
             before = now
-            # two equal stamps in a row: the file is not being written
+            # two equal stamps in succession show that the file is not being written
             if now != self._code.stamps and quiet >= (MISSING_POLLS if None in now.values() else 1):
                 self._run()
                 before = self._code.stamps

@@ -1,4 +1,4 @@
-"""`go.view(model)`: the page as a widget for JupyterLab, marimo and other hosts of anywidgets."""
+"""`go.view(model)`: the page as a widget for JupyterLab, marimo and other applications that support anywidget."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ export default { render };
 
 @exclusive
 def view(*models: MaterialLike, height: int = 640) -> AnyWidget:
-    """The page of `gonio view` in a notebook cell: balls, sliders, plots.
+    """Show the page of `gonio view` in a notebook cell, with balls, sliders and plots.
 
-    models  anything that `go.material` takes; if none is given, two rows of balls with and without Kulla-Conty
-    height  height of the cell, CSS pixels
-    Returns a widget, which the notebook shows. The page runs in the notebook's browser without a server, so there is no
-    live reference. Raises InputError if a model cannot be shown, MachineError if anywidget is missing.
+    models  anything that `go.material` accepts; by default, two rows of balls, with and without Kulla-Conty
+    height  height of the cell, in CSS pixels
+    Returns a widget, which the notebook displays. The page runs in the notebook's browser without a server, so there is
+    no live reference. Raises InputError if a model cannot be shown, MachineError if anywidget is missing.
 
         go.view(go.Conductor.preset("Au"), "lambert")
     """
@@ -88,7 +88,7 @@ def _stage(models: tuple[MaterialLike, ...]) -> stage.Stage:
 
 
 def _own(model: BSDF) -> set[str]:
-    """The parameters that differ from their defaults, which the creator of the material has set."""
+    """The parameters that differ from their defaults, and have therefore been set explicitly."""
     return {
         tree.join(path, name)
         for path, inner in tree.walk(model)

@@ -1,2 +1,5 @@
-"""Long jobs that survive interruptions: files of arrays that are complete or rejected, parts of a job that are computed
-once, and the executor that runs the parts, in this process or on a cluster."""
+"""Long jobs that can be interrupted and continued.
+
+Provides files of arrays that are written atomically and detect damage, a store for the finished parts of a job, and
+executors that run the parts in this process or on a cluster.
+"""

@@ -1,11 +1,12 @@
-"""Clusters: worker processes on this machine or on several, by Dask, which is imported only when a cluster is opened.
+"""Clusters of worker processes on this machine or on several, with Dask, which is imported when a cluster is opened.
 
     with Cluster(workers=4):                          # processes of this machine
     with Cluster("tcp://10.0.0.7:8786"):              # the workers that have joined that scheduler
 
-If a worker fails, freezes or cannot be reached, another one repeats its part, and the first result counts, since all
-results are bit-identical. A part that fails because of its input fails the job and is not repeated. A worker with
-another version of Gonio or another kind of processor would give different bits and is rejected by name.
+If a worker fails, freezes or cannot be reached, another worker repeats its part. The first result is used, because all
+results are bit-identical. If a part fails because of its input, it is not repeated, and the job fails. A worker with a
+different version of Gonio or a different kind of processor would not give bit-identical results; it is rejected with an
+error that names the worker.
 """
 
 from __future__ import annotations
@@ -38,15 +39,15 @@ if TYPE_CHECKING:
 
 INSTALL = "pip install 'gonio[cluster]'"
 POLL_INTERVAL = 0.2  # seconds between checks of the workers and for an interrupt
-PARTS_PER_WORKER = 4  # parts per worker: the one it computes, and others to continue with while results are sent
-MAX_DELAY = 5.0  # seconds that a part may take longer than usual before it is also given to another worker
-MAX_SLOWDOWN = 3.0  # multiple of the median time that a part may take in addition
+PARTS_PER_WORKER = 4  # parts submitted per worker: one to compute, and others to continue with while results are sent
+MAX_DELAY = 5.0  # seconds by which a part may exceed its longest expected time before it is submitted again
+MAX_SLOWDOWN = 3.0  # longest expected time of a part, as a multiple of the median time
 SILENT_AFTER = 8.0  # seconds without a heartbeat after which a worker gets no more parts
 FROZEN_AFTER = 30.0  # seconds without a heartbeat after which a local worker is killed and replaced
 MAX_COPIES = 5
-MAX_FETCHED = 64  # most results fetched at once
-FETCH_TIMEOUT = 20.0  # seconds that fetching them may take
-MAX_LOSSES = 3  # workers that may be lost while they compute the same part; with one more, the part counts as the cause
+MAX_FETCHED = 64  # maximum number of results fetched at once
+FETCH_TIMEOUT = 20.0  # seconds that fetching these results may take
+MAX_LOSSES = 3  # number of workers that may be lost during the same part; if one more is lost, the part is the cause
 CONNECT_TIMEOUT = 10.0  # seconds to wait for a scheduler to answer
 JOIN_TIMEOUT = 60.0  # seconds to wait for the first worker
 START_INTERVAL = (
@@ -55,13 +56,13 @@ START_INTERVAL = (
 
 
 class Cluster:
-    """Workers of this machine or of a Dask scheduler. A context manager: inside it, they run the parts of jobs.
+    """A context manager inside which workers on this machine, or those of a Dask scheduler, run the parts of jobs.
 
     address   address of a scheduler, "tcp://host:8786" or "tls://..."
-    workers   number of processes to start on this machine instead; as many as it has cores start at once, the others
-              one by one while the job runs, since a start slows the running workers down
-    security  Dask's `Security` for a scheduler with TLS; None uses Dask's own configuration
-    wait      seconds to wait, with a warning, for the first worker of a scheduler
+    workers   number of processes to start on this machine instead. One per core starts at once; the others start one by
+              one while the job runs, because each start slows down the running workers
+    security  Dask's `Security` for a scheduler with TLS; None uses Dask's configuration
+    wait      seconds to wait for the first worker of a scheduler; a warning is issued while there is none
     Raises InputError for both or neither of `address` and `workers`, and for an invalid address. Raises MachineError if
     Dask is not installed, if no scheduler answers, or if no worker joins it within `wait` seconds.
     """
@@ -92,7 +93,7 @@ class Cluster:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._begun = 0.0
         self._sent: set[str] = set()
-        self._warned = False  # whether a warning was issued that it waits for a worker
+        self._warned = False  # whether a warning has been issued that there is no worker yet
         self._stack = contextlib.ExitStack()
         self.silent: dict[str, float] = {}  # seconds since each worker's last heartbeat, at the last check
         self.restarts = self.copies = 0
@@ -106,7 +107,7 @@ class Cluster:
 
         quiet: dict[str, object] = {"distributed.scheduler.allowed-failures": 1000}
         quiet |= {"distributed.comm.timeouts.connect": "10s", "distributed.admin.low-level-log-length": 0}
-        # A computing worker may not answer for a while; the parts of a frozen one are given to others anyway.
+        # A worker may not answer while it computes; parts of a frozen worker are given to others in any case.
         quiet |= {"distributed.scheduler.worker-ttl": "300s"}
         self._stack.enter_context(dask.config.set(quiet))
         garbage.pause()  # Dask runs threads
@@ -124,11 +125,11 @@ class Cluster:
                 self._address = self._local.scheduler_address
                 self._processes = [self._start() for _ in range(min(self._wanted, _cores()))]
                 self._begun = time.monotonic()
-            logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported here, in one line
+            logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported below, in one line
             self._client = _client(
                 self._address, security=self._security, timeout=CONNECT_TIMEOUT, set_as_default=False
             )
-        except Exception as error:  # libraries raise many kinds, depending on what answers
+        except Exception as error:  # the type depends on the program that answers
             self.close()
             text = " ".join(str(error).split())[:200]
             what = f"no scheduler answers: {text}"
@@ -140,7 +141,7 @@ class Cluster:
         self.close()
 
     def close(self) -> None:
-        """Stop the workers and the scheduler that were started here, and disconnect."""
+        """Stop the workers and the scheduler that this cluster has started, and disconnect."""
         for process in self._processes:
             process.kill()
         self._stack.close()
@@ -173,7 +174,7 @@ class Cluster:
 
     @property
     def size(self) -> int:
-        """Number of workers, including those yet to be started."""
+        """The number of workers, including those that have not started yet."""
         return self._wanted or max(len(self._alive()), 1)
 
     def _workers(self) -> dict[str, Any]:
@@ -186,9 +187,9 @@ class Cluster:
         return [name for name, seconds in self.silent.items() if seconds < SILENT_AFTER]
 
     def _check(self) -> Iterator[None]:
-        """Wait for the first worker, yielding while there is none.
+        """Wait for the first worker, and yield repeatedly during the wait.
 
-        Raise MachineError if none joins in time, or, before any part is submitted, for a worker with another version.
+        Raises MachineError if no worker joins in time, or if a worker has a different version.
         """
         if self._wanted is not None:
             return
@@ -215,7 +216,7 @@ class Cluster:
     def run(
         self, function: executor.Function, arguments: Sequence[tuple[executor.Argument, ...]], files: Mapping[str, Path]
     ) -> Generator[tuple[int, Arrays], None, None]:
-        """As `Executor.run`."""
+        """Run the parts of a job on the workers, see `Executor.run`."""
         if not arguments:
             return
         for _ in self._check():
@@ -231,7 +232,7 @@ class Cluster:
             job.cancel()
 
     def _send(self, files: Mapping[str, Path]) -> None:
-        """Send files by content, once to each worker, including those that join later."""
+        """Send files to all workers, including those that join later; equal contents are sent only once."""
         assert self._client is not None
         from . import worker
 
@@ -241,7 +242,7 @@ class Cluster:
                 self._sent.add(name)
 
     def _revive(self) -> None:
-        """Replace workers that have failed or frozen, and start the next one that is still missing."""
+        """Replace workers that have failed or frozen, and start the next of the remaining workers."""
         if any(seconds > FROZEN_AFTER for seconds in self.silent.values()):
             names = {
                 str(one["name"]) for one in self._workers().values() if time.time() - one["last_seen"] > FROZEN_AFTER
@@ -261,7 +262,7 @@ class Cluster:
 
 
 def _client(address: str | None, **options: object) -> Client:
-    """A client of the scheduler. If it cannot connect, mark it closed, since closing it would take 20 seconds."""
+    """A client of the scheduler. If it cannot connect, it is marked as closed, because closing it takes 20 seconds."""
     from distributed import Client
 
     client = Client.__new__(Client)
@@ -278,7 +279,7 @@ def _cores() -> int:
 
 
 class _Job:
-    """The parts of one call of `run`: which are submitted, to which workers, and since when."""
+    """The state of the parts in one call of `run`: the submitted ones, their submission times, and the results."""
 
     def __init__(
         self, cluster: Cluster, function: executor.Function, arguments: Sequence[tuple[executor.Argument, ...]]
@@ -300,7 +301,7 @@ class _Job:
         self.alive: list[str] = []
 
     def hand_out(self) -> None:
-        """Submit enough parts for every worker, and submit parts that take too long a second time."""
+        """Submit enough parts for all workers, and submit parts again that take too long."""
         while self.waiting and len(self.out) < PARTS_PER_WORKER * self.cluster.size:
             self._submit(self.waiting.popleft())
         now = time.monotonic()
@@ -326,13 +327,13 @@ class _Job:
         future.add_done_callback(lambda done: self.answers.put((index, done)))
 
     def next(self) -> tuple[int, Arrays]:
-        """Index and result of a finished part; (-1, {}) if none has finished for a while."""
+        """The index and result of a finished part; (-1, {}) if no part has finished for a while."""
         if not self.ready:
             self._fetch()
         return self.ready.popleft() if self.ready else (-1, {})
 
     def _fetch(self) -> None:
-        """Fetch all finished results at once: one by one takes four times as long."""
+        """Fetch all finished results at once; fetching them one by one would take four times as long."""
         try:
             answers = [self.answers.get(timeout=POLL_INTERVAL)]
         except queue.Empty:
@@ -353,7 +354,7 @@ class _Job:
         try:
             fetch = self.client._gather
             results = self.client.sync(fetch, list(done.values()), errors="raise", callback_timeout=FETCH_TIMEOUT)
-        except Exception:  # a worker failed or froze and its results are lost: compute each part again elsewhere
+        except Exception:  # a worker has failed or frozen, and its results are lost: each part is computed again
             for index in done:
                 self._failed(index, TimeoutError())
             return
@@ -365,7 +366,7 @@ class _Job:
             self.ready.append((index, arrays))
 
     def _failed(self, index: int, error: BaseException) -> None:
-        """Raise the error that the part itself raised; submit the part again if its worker was lost."""
+        """Submit a part again if its worker was lost; otherwise raise the error of the part."""
         from asyncio import CancelledError
 
         from distributed.client import FutureCancelledError

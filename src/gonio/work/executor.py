@@ -1,10 +1,10 @@
-"""The executor of a job's parts: this process, which runs them one after the other, or a cluster.
+"""Executors, which run the parts of a job: one after another in this process, or on a cluster.
 
     for index, arrays in each(function, arguments, keys):
         ...                                  # in the order in which they finish
 
-A part consists of a function at the top level of a module and its arguments, which can be pickled; it returns arrays.
-It must depend on nothing else, so that its result is bit-identical on every worker and it may run twice.
+A part consists of a function at the top level of a module and of arguments that can be pickled; it returns arrays. Its
+result must depend on nothing else, so that it is bit-identical on every worker and the part can run twice.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ Argument: TypeAlias = Any  # anything that can be pickled
 
 
 class Executor(Protocol):
-    """Runs the parts of a job."""
+    """The interface of executors, which run the parts of a job."""
 
     remote: bool
-    """Whether other processes, even a single one, run the parts, so that arguments and files must be sent to them."""
+    """Whether other processes run the parts, so that arguments and files must be sent to them."""
 
     @property
     def size(self) -> int:
-        """Number of parts that run at the same time."""
+        """The number of parts that run at the same time."""
         ...
 
     def run(
         self, function: Function, arguments: Sequence[tuple[Argument, ...]], files: Mapping[str, Path]
     ) -> Generator[tuple[int, Arrays], None, None]:
-        """Yield index and result of each part when it finishes; (-1, {}) if none has finished for a while.
+        """Yield the index and result of each part when it finishes, and (-1, {}) if no part finishes for a while.
 
         arguments  the arguments of `function` for each part
         files      the files that parts open through `file`, by content hash
@@ -45,7 +45,7 @@ class Executor(Protocol):
 
 
 class LocalExecutor:
-    """Runs the parts in this process."""
+    """An executor that runs the parts in this process."""
 
     size, remote = 1, False
 
@@ -71,7 +71,7 @@ def current() -> Executor:
 
 @contextlib.contextmanager
 def using(executor: Executor) -> Iterator[None]:
-    """Run parts by this executor inside the `with` block."""
+    """Use an executor to run parts inside the `with` block."""
     token = _executor.set(executor)
     try:
         yield
@@ -80,7 +80,7 @@ def using(executor: Executor) -> Iterator[None]:
 
 
 def file(content_hash: str) -> Path:
-    """The path of the file with that content, on the machine that runs the part."""
+    """The path of the file with the given content hash, on the machine that runs the part."""
     return _files.get()[content_hash]
 
 
@@ -90,12 +90,13 @@ def each(
     keys: Sequence[str] | None = None,
     files: Mapping[str, Path] | None = None,
 ) -> Generator[tuple[int, Arrays], None, None]:
-    """Yield index and result of each part, stored ones first, the others in the order in which they finish; (-1, {}) if
-    none has finished for a while, so that the caller can check for an interrupt.
+    """Yield the index and result of each part: first those of stored parts, then those of the others as they finish.
+
+    Yields (-1, {}) if no part finishes for a while, so that the caller can check for an interrupt.
 
     arguments  the arguments of `function` for each part
     keys       for each part, a hash of everything that it depends on; its result is then stored until the job is done
-               (`parts.job`). None: nothing is stored
+               (`parts.job`). None stores nothing
     files      files that the parts read, by content hash
     """
     stored = parts.current() if keys else None

@@ -1,4 +1,4 @@
-"""Everything besides its input that the bits of a result depend on: the version and code of Gonio, and the
+"""The properties of this installation that may change the bits of a result: the version and code of Gonio, and the
 processor."""
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .._version import __version__
 
-PACKAGES = (  # packages on whose code results depend
+PACKAGES = (  # the packages of Gonio whose code affects results
     "bridge", "catalog", "energy", "material", "materials", "measure", "ops", "optics", "pictures", "render", "scene",
     "transport", "work",
 )  # fmt: skip
@@ -31,7 +31,7 @@ def _version(name: str) -> str:
 
 @lru_cache
 def code() -> str:
-    """A hash of the code of Gonio that results depend on, since a checkout also changes between versions."""
+    """A hash of the code that affects results, because the code in a checkout changes between versions."""
     package = Path(__file__).parent.parent
     digest = hashlib.sha256()
     for path in sorted(p for name in PACKAGES for p in (package / name).rglob("*.py")):
@@ -40,7 +40,7 @@ def code() -> str:
 
 
 def processor() -> str:
-    """The properties of the processor that affect rounding, and the version of LLVM that compiles for it."""
+    """The properties of the processor that affect rounding, and the version of LLVM, which compiles the kernels."""
     import drjit as dr
 
     llvm = ".".join(map(str, dr.detail.llvm_version()))
@@ -58,7 +58,7 @@ def _vectors() -> str:
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content, "missing" if it cannot be read."""
+    """The SHA-256 hash of a file's content; "missing" if the file cannot be read."""
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,13 +1,14 @@
-"""Files of facts and arrays that are written completely or not at all, and that detect damage.
+"""Files of metadata ("facts") and arrays that are written atomically and detect damage.
 
     "gonio kept 1\\n"   magic number
     8 bytes            length of the header, little-endian
     header             JSON: {"facts": ..., "arrays": [[name, dtype, shape], ...]}
     arrays             one after the other, little-endian, in C order
-    4 bytes            CRC-32 of everything before
+    4 bytes            CRC-32 of all preceding bytes
 
-The header gives the length, which reveals a truncated file, and the checksum detects damage. The preceding file
-remains beside it as NAME.previous, in case the newest one is damaged. Nothing that is read here is ever executed.
+The header determines the length, which reveals a truncated file, and the checksum reveals damage. The previous version
+of the file is kept beside it as NAME.previous, in case the newest one is damaged. Files never contain code that would
+be executed.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 _MAGIC = b"gonio kept 1\n"
 _TYPES = ("float64", "float32", "int64", "uint32", "uint8", "bool")
-_CHUNK = 1 << 24  # bytes written at a time, so that the checksum needs no second copy
+_CHUNK = 1 << 24  # bytes written at a time, so that computing the checksum does not need a second copy
 
 
 class Kept(NamedTuple):
-    """The content of a file."""
+    """The facts and arrays in a file."""
 
     facts: Facts
     arrays: Arrays
@@ -47,11 +48,11 @@ class Kept(NamedTuple):
 def write(
     path: Path, facts: Facts, arrays: Mapping[str, NDArray[Any]], previous: bool = False, durable: bool = True
 ) -> None:
-    """Write the file; at any time, either the old or the new one exists.
+    """Write a file atomically: at any time, either the old or the new version exists.
 
-    previous  keep the existing file as NAME.previous
-    durable   flush it to the disk
-    Raises MachineError if the disk is full, TypeError for an array whose type a file cannot hold.
+    previous  whether to keep the existing file as NAME.previous
+    durable   whether to flush the file to the disk
+    Raises MachineError if the disk is full, TypeError for an array of a type that cannot be stored.
     """
     parts = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     for name, array in parts.items():
@@ -90,7 +91,7 @@ def _previous(path: Path) -> Path:
 
 
 def remove(path: Path) -> None:
-    """Remove the file, NAME.previous and unfinished files."""
+    """Remove a file, its NAME.previous, and unfinished versions of it."""
     newest = files.with_ending(path, ".next")
     left = path.parent.glob(
         f".{glob.escape(newest.name)}.*.part.next"
@@ -100,12 +101,12 @@ def remove(path: Path) -> None:
 
 
 def exists(path: Path) -> bool:
-    """Whether the file or NAME.previous exists."""
+    """Whether a file or its NAME.previous exists."""
     return os.path.isfile(path) or os.path.isfile(_previous(path))
 
 
 def remove_damaged(path: Path) -> None:
-    """Remove a damaged file if NAME.previous exists, since the next `write` would replace that intact copy with it."""
+    """Remove a damaged file if NAME.previous exists, because the next `write` would replace the latter with it."""
     with contextlib.suppress(OSError):
         try:
             _read(path)
@@ -115,7 +116,7 @@ def remove_damaged(path: Path) -> None:
 
 
 def read(path: Path) -> Kept:
-    """The content of the file, or of NAME.previous if it is damaged. Raises InputError if neither can be used."""
+    """Read a file, or NAME.previous if the file is damaged. Raises InputError if neither can be used."""
     problem = None
     for name in (path, _previous(path)):
         try:

@@ -1,7 +1,7 @@
-"""The finished parts of a job, stored in the user's cache folder until the whole job is done.
+"""Store the finished parts of a job in the user's cache folder until the whole job is done.
 
-Each part is stored under a hash of everything that it depends on, so that a stored part is always valid. Damaged files
-count as missing; a folder that cannot be written costs time, not correctness.
+Each part is stored under a hash of everything that it depends on, so a stored part is always valid. Damaged files count
+as missing. If the folder cannot be written, parts are computed again, but results remain correct.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ EXPIRY = 30 * 86400.0  # seconds after which the parts of an unfinished job are 
 
 
 def folder() -> Path:
-    """The user's cache folder: `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`."""
+    """The user's cache folder: `$GONIO_CACHE`, `$XDG_CACHE_HOME/gonio` or `~/.cache/gonio`, in this order."""
     given = os.environ.get("GONIO_CACHE")
     if given:
         return Path(given)
@@ -31,7 +31,7 @@ def folder() -> Path:
 
 
 def key_of(*what: object) -> str:
-    """A hash of everything that a part depends on: bytes are hashed as they are, all other values by their `repr`."""
+    """A hash of everything that a part depends on: of bytes themselves, and of the `repr` of other values."""
     digest = hashlib.sha256()
     for one in what:
         content = one if isinstance(one, bytes) else repr(one).encode("utf-8", "surrogateescape")
@@ -40,10 +40,10 @@ def key_of(*what: object) -> str:
 
 
 class Parts:
-    """The parts of one job.
+    """The stored parts of one job.
 
     name  name of the kind of job, such as "study"
-    what  everything that distinguishes this job from others
+    what  everything that distinguishes this job from other jobs of this kind
     """
 
     def __init__(self, name: str, *what: object) -> None:
@@ -65,18 +65,18 @@ class Parts:
         return part if part.facts.get("key") == key else None
 
     def put(self, key: str, arrays: Arrays, facts: Facts | None = None) -> None:
-        """Store a part. It is not flushed to the disk: a power cut may damage it, which `get` detects."""
+        """Store a part. It is not flushed to the disk, so a power failure may damage it; `get` detects the damage."""
         with contextlib.suppress(OSError, GonioError):
             self.open()
             kept.write(self.path(key), {**(facts or {}), "key": key}, arrays, durable=False)
 
     def open(self) -> Path:
-        """The folder, created if missing."""
+        """The folder of the parts, which is created if it is missing."""
         self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         return self.folder
 
     def clear(self) -> None:
-        """Remove all parts: the job is done."""
+        """Remove all parts, because the job is done."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
@@ -84,13 +84,15 @@ _current: ContextVar[Parts | None] = ContextVar("parts", default=None)
 
 
 def current() -> Parts | None:
-    """The parts of the current job; None if none are stored."""
+    """The stored parts of the current job; None if its parts are not stored."""
     return _current.get()
 
 
 @contextlib.contextmanager
 def job(name: str, *what: object) -> Iterator[Parts]:
-    """Store parts inside the `with` block. They are removed when it ends, except by an error or a signal.
+    """Store the parts of a job inside the `with` block.
+
+    The parts are removed at the end of the block, but are kept if an error or a signal ends it.
 
     name, what  as for `Parts`
     """

@@ -1,4 +1,4 @@
-"""Check within a few seconds whether a Dask scheduler can be reached; Dask itself tries for longer and logs errors."""
+"""Check within a few seconds whether a Dask scheduler can be reached; Dask would try for longer and log errors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..errors import InputError, MachineError
 
 CONNECT = 4.0  # seconds to resolve the name and to connect
 PROTOCOLS = ("tcp", "tls", "ws", "wss", "ucx", "ucxx", "inproc")
-MAX_GREETING = 1 << 20  # largest size in bytes of the first message, which has a few hundred
+MAX_GREETING = 1 << 20  # maximum size of the first message in bytes; usually, it has a few hundred
 CHECKED = ("tcp", "tls", "ws", "wss")  # protocols over a socket
 ADDRESS = re.compile(r"(?:(?P<protocol>\w+)://)?(?P<host>[^/\s]+):(?P<port>\d{1,5})/?")
 
@@ -35,9 +35,11 @@ def check(address: str) -> None:
 
 
 def _unreachable(host: str, port: int, greets: bool) -> str:
-    """Why no connection can be made; "" if one can. It runs in a thread, since resolving a name has no timeout.
+    """The reason why no connection can be made; "" if a connection can be made.
 
-    greets  whether the scheduler first sends the length of its first message, 8 bytes
+    The attempt runs in a thread, because name resolution has no timeout.
+
+    greets  whether the scheduler begins by sending the length of its first message, in 8 bytes
     """
     answers: queue.Queue[str] = queue.Queue()
 

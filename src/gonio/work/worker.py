@@ -1,4 +1,4 @@
-"""Code that runs on the workers of a cluster: parts of jobs, the files that they read, and a version check."""
+"""Code that runs on the workers of a cluster: it runs parts of jobs, provides their files, and checks versions."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _one = threading.Lock()  # only one thread may use Dr.Jit, even if a worker has 
 def do(
     function: executor.Function, arguments: tuple[executor.Argument, ...], wanted: dict[str, str]
 ) -> tuple[float, Arrays]:
-    """Run one part. Returns the seconds that it took and its result.
+    """Run one part of a job. Returns the time that it took, in seconds, and its result.
 
     wanted  the properties that this worker must have, as returned by `about`
     """
     with _one:
-        gc.disable()  # see `cluster.Cluster`: garbage is collected below, in this thread
+        gc.disable()  # garbage is collected below, in this thread, see `cluster.Cluster`
         started = time.perf_counter()
         name = ""
         with contextlib.suppress(ValueError):
@@ -50,7 +50,7 @@ def do(
 
 
 def about() -> dict[str, str]:
-    """The properties that must agree on all workers, by the names that errors use."""
+    """The properties that must be the same on all workers, by their names in errors."""
     python = ".".join(map(str, sys.version_info[:2]))
     return {
         "version": f"{facts.versions()}, Python {python}",
@@ -60,15 +60,19 @@ def about() -> dict[str, str]:
 
 
 def about_or_why() -> dict[str, str]:
-    """As `about`; if that fails, the reason for the failure replaces the version."""
+    """The result of `about`. If it fails, the reason for the failure replaces the version."""
     try:
         return about()
-    except Exception as error:  # that Gonio has another interface, or none is installed
+    except Exception as error:  # Gonio is missing on the worker, or has a different interface
         return {"version": f"none that answers ({type(error).__name__}: {error})"}
 
 
 def compare(own: Mapping[str, str], other: object, name: str) -> None:
-    """Raise MachineError, with the worker's name, if its `about`, `other`, differs from ours, `own`."""
+    """Raise MachineError, with the name of the worker, if its properties differ from those of this process.
+
+    own    the result of `about` in this process
+    other  the result of `about_or_why` on the worker
+    """
     if not isinstance(other, dict):
         raise MachineError(
             f"Gonio does not answer on worker {name}: {other}", "cluster", "run there: pip install 'gonio[cluster]'"
@@ -82,7 +86,7 @@ def compare(own: Mapping[str, str], other: object, name: str) -> None:
 
 
 class File(WorkerPlugin):
-    """A plugin of a Dask worker that provides one file, identified by a hash of its content."""
+    """A plugin for Dask workers that provides one file, identified by a hash of its content."""
 
     def __init__(self, content_hash: str, content: bytes) -> None:
         self.content_hash, self.content, self.path = content_hash, content, Path()
@@ -136,7 +140,7 @@ def serve() -> None:
             await worker.finished()
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported to the client
-    # Dask's logs and profiles would not be read here
+    # Dask's logs and profiles are not used here
     dask.config.set({"distributed.admin.low-level-log-length": 0, "distributed.worker.profile.enabled": False})
     with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
         asyncio.run(work())

@@ -16,7 +16,7 @@ class AlbedoPanel implements Panel {
   readonly id = "albedo";
   readonly title = "Albedo";
   readonly order = 4;
-  readonly doc = "E(μ): the fraction of power scattered, with the white furnace's line at 1";
+  readonly doc = "Directional albedo E(μ), the fraction of the power that is scattered, with a line at 1 for the white furnace";
   private app!: App;
   private curves!: Curves;
   private key!: HTMLElement;
@@ -114,7 +114,7 @@ class AlbedoPanel implements Panel {
     });
     legend(this.key, models, (model) => {
       const estimate = estimates.get(model);
-      if (!estimate) return model.shader.manifest.functions.sample ? ": waiting" : ": the page has no sample() of it";
+      if (!estimate) return model.shader.manifest.functions.sample ? ": waiting for samples" : ": the page does not contain its sample()";
       const worst = estimate.error.reduce((a, b) => Math.max(a, b), 0);
       const loss = Math.max(...MUS.map((_, i) => 1 - channelOf(estimate.value, i, channel)));
       return `: standard error ≤ ${short(worst)} (${estimate.samples.toLocaleString("en")} samples per direction), largest loss ${short(Number(loss.toFixed(4)))}`;

@@ -6,7 +6,7 @@ import { COMPARISON, type Comparison, comparisonOf, type Kind, KINDS } from "../
 import { type Pixels, PIXELS } from "../plots/metrics";
 
 const MODES: Record<CompareMode, string> = { off: "raster only", side: "side by side", wipe: "wipe", difference: "difference" };
-const RANGES = { auto: "fits the picture", "1": "0 to 1", "0.1": "0 to 0.1", "0.01": "0 to 0.01", "0.001": "0 to 0.001" };
+const RANGES = { auto: "automatic", "1": "0 to 1", "0.1": "0 to 0.1", "0.01": "0 to 0.01", "0.001": "0 to 0.001" };
 
 class ComparePanel implements Panel {
   readonly id = COMPARISON;
@@ -63,13 +63,13 @@ class ComparePanel implements Panel {
     const { figures, lack } = this.comparison;
     const rows: [string, string, string][] = figures
       ? [
-          ["RMSE", figures.rmse.toExponential(3), "root of the mean squared difference of linear radiance"],
+          ["RMSE", figures.rmse.toExponential(3), "root-mean-square difference of linear radiance"],
           ["relMSE", figures.relmse.toExponential(3), "mean of (x − r)² / (r² + 0.01), linear radiance"],
           ["mean x / mean r", figures.meanRatio.toFixed(5), "1 if no energy is lost or gained"],
-          ["FLIP", figures.flip === null ? "…" : figures.flip.toFixed(5), "0 equal, 1 farthest: the difference perceived when alternating between the two as shown on this screen"],
+          ["FLIP", figures.flip === null ? "…" : figures.flip.toFixed(5), "difference perceived when the displayed pictures alternate, from 0 (none) to 1 (largest)"],
           ["pixels", figures.pixels.toLocaleString("en"), PIXELS[this.comparison.settings().pixels]],
-          ...(figures.broken ? [["not finite",  figures.broken.toLocaleString("en"), "pixels without a finite value, shown as a checkerboard: only FLIP includes them, as they are displayed"] as [string, string, string]] : []),
-          ["samples", `${figures.samples[0]} and ${figures.samples[1]}`, "per pixel of the raster picture (x) and of the reference (r)"],
+          ...(figures.broken ? [["not finite",  figures.broken.toLocaleString("en"), "pixels without a finite value, displayed as a checkerboard; only FLIP includes them, as displayed"] as [string, string, string]] : []),
+          ["samples", `${figures.samples[0]} and ${figures.samples[1]}`, "samples per pixel of the raster picture (x) and of the reference (r)"],
         ]
       : [];
     this.table.replaceChildren(
@@ -81,7 +81,7 @@ class ComparePanel implements Panel {
         return row;
       }),
     );
-    this.note.textContent = figures ? "Without silhouettes: partly covered pixels and their neighbors are excluded, since the pixel filters differ there." : lack || "Waiting for the first pictures.";
+    this.note.textContent = figures ? "Without silhouettes: partly covered pixels and their neighbors are excluded, because the pixel filters differ there." : lack || "Waiting for the first pictures.";
   }
 }
 

@@ -28,7 +28,7 @@ class HalfDifferencePanel implements Panel {
   readonly id = "half-difference";
   readonly title = "θh θd";
   readonly order = 3;
-  readonly doc = "Half and difference angles: curves and the image slice";
+  readonly doc = "Curves and the image slice over half angle and difference angle";
   private app!: App;
   private controls!: Record<"thetaH" | "thetaD" | "phiD" | "exposure", Control<number>>;
   private show!: Control<Show>;
@@ -52,7 +52,7 @@ class HalfDifferencePanel implements Panel {
     this.show = select(bar, "show", "An image over both angles, or a curve over one", SHOW, (show) => set({ show }));
     this.controls = {
       thetaH: range(bar, "θh", "Angle between half vector and normal", [0, 89, 0.5], "°", (thetaH) => set({ thetaH })),
-      thetaD: range(bar, "θd", "Angle between half vector and ωi: the angle of Fresnel's term", [0, 89, 0.5], "°", (thetaD) => set({ thetaD })),
+      thetaD: range(bar, "θd", "Angle between half vector and ωi: the angle of the Fresnel term", [0, 89, 0.5], "°", (thetaD) => set({ thetaD })),
       phiD: range(bar, "φd", "Azimuth of ωi about the half vector", [0, 180, 1], "°", (phiD) => set({ phiD })),
       exposure: range(bar, "exposure", "Brightness of the image slice, in stops", [-10, 10, 0.1], "", (exposure) => set({ exposure })),
     };

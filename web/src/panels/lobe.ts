@@ -17,7 +17,7 @@ class LobePanel implements Panel {
   readonly title = "Lobe";
   readonly order = 1;
   readonly marksPoint = true;
-  readonly doc = "The lobe in 3-D at the clicked point";
+  readonly doc = "The lobe at the selected point, in 3-D";
   private app!: App;
   private view!: LobeView;
   private viewing!: ViewingControls;
@@ -33,7 +33,7 @@ class LobePanel implements Panel {
     const bar = element("div", "p-bar");
     this.viewing = new ViewingControls(bar, app);
     this.log = check(bar, "log", `Logarithmic length over ${DECADES} decades below the largest value`, (log) => app.store.setPanel(this.id, { log }));
-    this.color = select(bar, "color", "By model, or by value (viridis, the same scale as the length)", { auto: "auto", model: "by model", value: "by value" }, (color) =>
+    this.color = select(bar, "color", "Color by model, or by value (viridis, with the same scale as the length)", { auto: "auto", model: "by model", value: "by value" }, (color) =>
       app.store.setPanel(this.id, { color }),
     );
     const body = element("div", "p-body p-lobe");

@@ -81,7 +81,7 @@ class ProbePanel implements Panel {
       ...rows.map(([name, v]) => line("td", [name, ...v.slice(0, 3).map(exact), exact(channelOf(v, 0, "luminance")), exact(v[3] as number)])),
     );
     const [column, row] = this.pixel(raster);
-    const spp = reference?.samples ? `; ${raster.samples} and ${reference.samples} samples a pixel` : "";
+    const spp = reference?.samples ? `; ${raster.samples} and ${reference.samples} samples per pixel` : "";
     this.note.textContent = `Pixel (${column}, ${row}) of ${raster.width} × ${raster.height}, from the top left${spp}. Linear radiance times coverage, before exposure and tone curve.`;
   }
 

@@ -40,7 +40,7 @@ class SlicesPanel implements Panel {
     host.classList.add("p-panel");
     const set = (values: Partial<typeof DEFAULTS>) => app.store.setPanel(this.id, values);
     const bar = element("div", "p-bar");
-    this.quantity = select(bar, "show", "f |cos θi| is the integrand of a picture; f the BSDF itself; pdf the density of sample()", QUANTITIES, (quantity) => set({ quantity }));
+    this.quantity = select(bar, "show", "f |cos θi| is the integrand of the reflection integral, f is the BSDF itself, and pdf is the density of sample()", QUANTITIES, (quantity) => set({ quantity }));
     this.log = check(bar, "log", "Logarithmic values", (log) => set({ log }));
     this.turn = range(bar, "turn", "Angle between the plane of the slice and the plane of incidence", [-90, 90, 1], "°", (turn) => set({ turn }));
     this.viewing = new ViewingControls(bar, app);

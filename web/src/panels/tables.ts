@@ -43,9 +43,9 @@ class TablesPanel implements Panel {
     const set = (values: Partial<typeof DEFAULTS>) => app.store.setPanel(this.id, values);
     const bar = element("div", "p-bar");
     this.which = select<string>(bar, "table", "The textures that the page's shaders read", {}, (table) => set({ table, channel: -1, layer: 0 }));
-    this.channel = select<string>(bar, "component", "Component of the texel, if it has several", { "0": "0" }, (channel) => set({ channel: Number(channel) }));
+    this.channel = select<string>(bar, "component", "Component of the texels, if there are several", { "0": "0" }, (channel) => set({ channel: Number(channel) }));
     this.layer = range(bar, "layer", "Slice of a three-dimensional table", [0, 0, 1], "", (layer) => set({ layer }));
-    this.fixed = check(bar, "0 to 1", "Colors from 0 to 1 instead of from the smallest to the largest value", (fixed) => set({ fixed }));
+    this.fixed = check(bar, "0 to 1", "Color scale from 0 to 1, instead of from the smallest to the largest value", (fixed) => set({ fixed }));
     const body = element("div", "p-body");
     const cell = element("div", "p-cell p-wide");
     body.append(cell);
@@ -133,7 +133,7 @@ class TablesPanel implements Panel {
     Object.assign(this.bitmap, { width, height });
     (this.bitmap.getContext("2d") as CanvasRenderingContext2D).putImageData(paint(flipped, width, height, "viridis", ...this.span), 0, 0);
     this.current = { table, channel, layer };
-    this.note.textContent = `${table.doc ? `${table.doc}. ` : ""}${table.size.join(" × ")} texels of ${table.channels} float32; this image: smallest ${exact(low)}, largest ${exact(high)}. Axes: texel centers from 0 to 1.`;
+    this.note.textContent = `${table.doc ? `${table.doc}. ` : ""}${table.size.join(" × ")} texels of ${table.channels} float32; values of this image: ${exact(low)} to ${exact(high)}. Axes: texel centers, from 0 to 1.`;
     this.write();
     this.sketch.redraw();
   }

@@ -114,7 +114,7 @@ export class Comparison {
     const pair = this.view.pair();
     if (!pair) {
       this.figures = this.pair = null;
-      this.lack = `The reference has ${reference.width} × ${reference.height} pixels, which do not divide the raster picture's size.`;
+      this.lack = `The reference has ${reference.width} × ${reference.height} pixels, and the size of the raster picture is not a multiple of this size.`;
       for (const listener of this.listeners) listener();
       return;
     }
@@ -182,7 +182,7 @@ export class Comparison {
     const [left, right] = this.tags;
     left.hidden = right.hidden = !two;
     left.textContent = "raster";
-    right.textContent = ready ? (reference.stale ? "earlier reference …" : `reference, ${reference.samples} spp${reference.done ? "" : " …"}`) : "";
+    right.textContent = ready ? (reference.stale ? "previous reference …" : `reference, ${reference.samples} spp${reference.done ? "" : " …"}`) : "";
     const stacked = tall && mode === "side";
     // In the wipe the labels move with the boundary; they are always below the page's bar of terms.
     const bar = `${100 * wipe}%`;
@@ -196,11 +196,11 @@ export class Comparison {
     const { kind, range, pixels } = this.settings();
     const table = colorTable("magma");
     const bar = element("i");
-    const how = kind !== "flip" && range === "auto" ? "; 99.5 % of the pixels are inside" : "";
+    const how = kind !== "flip" && range === "auto" ? "; 99.5 % of the pixels are within the scale" : "";
     this.scale.title = `${KINDS[kind]}, ${PIXELS[pixels]}${how}`;
     bar.style.background = `linear-gradient(to right, ${Array.from({ length: 17 }, (_, i) => css(table, i / 16)).join(", ")})`;
     const high = `${short(this.view.high)}${kind === "flip" && this.view.high === 1 ? "" : " or more"}`;
-    this.scale.replaceChildren(element("span", "", `${KINDS[kind]}${this.app.referencePicture()?.stale ? ", of before" : ""}`), element("b", "", "0"), bar, element("b", "", high));
+    this.scale.replaceChildren(element("span", "", `${KINDS[kind]}${this.app.referencePicture()?.stale ? ", previous state" : ""}`), element("b", "", "0"), bar, element("b", "", high));
   }
 
   private listen(): void {

@@ -51,7 +51,7 @@ export class Layout {
     const actions: Actions = { copyLink: () => void this.copyLink(), screenshot: () => void this.screenshot(), theme: () => this.theme() };
     const notes = app.data.notes ?? [];
     const help = helpCard(notes);
-    this.furnace = button("Furnace", "White furnace: radiance 1 from all directions (F)", () => app.store.set("furnace", !app.state.furnace));
+    this.furnace = button("Furnace", "White furnace: a radiance of 1 from all directions (F)", () => app.store.set("furnace", !app.state.furnace));
     this.furnace.dataset["act"] = "furnace";
     this.solo = button("All rows", "Show all rows again (Esc)", () => app.store.set("solo", null), "solo-note");
     const bar = element(
@@ -62,7 +62,7 @@ export class Layout {
       ...(notes.length ? [button(notes.length === 1 ? "1 note" : `${notes.length} notes`, notes.join("\n"), () => help.showModal(), "notes")] : []),
       element("span", { class: "spacer" }),
       this.furnace,
-      button("Link", "Copy a link to this view with all its settings (C)", actions.copyLink),
+      button("Link", "Copy a link to this view that contains all settings (C)", actions.copyLink),
       button("PNG", "Save the picture (S)", actions.screenshot),
       button("Reset", "Restore the page's initial state", () => app.store.reset()),
       button("◐", "Light or dark theme (T)", actions.theme, "icon"),

@@ -39,16 +39,16 @@ export class LightSection {
     gui.$children.replaceChildren();
     new TickControl(gui, {
       label: "White furnace (F)",
-      doc: "All lights replaced by a constant radiance of 1 from all directions: a surface without energy loss becomes invisible.",
+      doc: "Replaces all lights by a constant radiance of 1 from all directions; a surface without energy loss becomes invisible.",
       get: () => app.state.furnace,
       set: (on) => app.store.set("furnace", on),
       initial: () => false,
     });
     app.state.lights.forEach((light, index) => this.addLight(light, index));
-    if (app.state.furnace) addRow(gui, element("p", { class: "note" }, "The furnace is the only light: radiance 1 from every direction. The lights above are off."));
+    if (app.state.furnace) addRow(gui, element("p", { class: "note" }, "The furnace is the only light, with a radiance of 1 from all directions. The lights above are off."));
     const add = (type: Light["type"], label: string) =>
-      button(`+ ${label}`, `Add a light: ${label}${type === "environment" ? ", a studio; a picture can replace it" : ""}`, () => {
-        if (app.state.lights.length >= MAX_LIGHTS) return app.say(`No more than ${MAX_LIGHTS} lights are possible.`);
+      button(`+ ${label}`, `Add a light: ${label}${type === "environment" ? " (a studio, which can be replaced by a picture)" : ""}`, () => {
+        if (app.state.lights.length >= MAX_LIGHTS) return app.say(`At most ${MAX_LIGHTS} lights are possible.`);
         if (type === "environment" && app.state.lights.some((l) => l.type === "environment")) return app.say("The scene already has an environment.");
         if (type === "environment") return useStudio(app);
         app.store.update("lights", (state) => state.lights.push(newLight(type)));
@@ -93,16 +93,16 @@ export class LightSection {
         Object.assign(l, { direction: [Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e)] });
       };
       new RangeControl(folder, field("azimuth", "Azimuth of the light about the vertical; 0 is behind the camera.", (l) => angles(l)[0], (l, v) => point(l, v, angles(l)[1]), "degrees"), { low: -180, high: 180 });
-      new RangeControl(folder, field("elevation", "Height above the horizon.", (l) => angles(l)[1], (l, v) => point(l, angles(l)[0], Math.min(89.9, Math.max(-89.9, v))), "degrees"), { low: -90, high: 90 });
-      power("irradiance", "On a surface that faces the light, linear RGB.", "irradiance", "W/m²");
+      new RangeControl(folder, field("elevation", "Elevation of the light above the horizon.", (l) => angles(l)[1], (l, v) => point(l, angles(l)[0], Math.min(89.9, Math.max(-89.9, v))), "degrees"), { low: -90, high: 90 });
+      power("irradiance", "Irradiance on a surface that faces the light, in linear RGB.", "irradiance", "W/m²");
     } else if (light.type === "point") {
       vector("position", "World coordinates; a ball has radius 1.", "position");
-      power("intensity", "Linear RGB.", "intensity", "W/sr");
+      power("intensity", "Intensity of the light, in linear RGB.", "intensity", "W/sr");
     } else if (light.type === "area") {
       vector("center", "World coordinates; a ball has radius 1.", "center");
-      vector("half edge u", "From the center to the middle of one edge.", "u");
-      vector("half edge v", "From the center to the middle of the other edge.", "v");
-      power("radiance", "Equal on both sides, linear RGB.", "radiance", "W/(m² sr)");
+      vector("half edge u", "Vector from the center to the midpoint of one edge.", "u");
+      vector("half edge v", "Vector from the center to the midpoint of an adjacent edge.", "v");
+      power("radiance", "Radiance, equal on both sides, in linear RGB.", "radiance", "W/(m² sr)");
     } else this.addEnvironment(folder, index, field);
     addRow(folder, element("div", { class: "buttons" }, button("Remove", `Remove this light`, () => app.store.update("lights", (state) => state.lights.splice(index, 1)))));
   }
@@ -112,27 +112,27 @@ export class LightSection {
     const light = app.state.lights[index];
     const pictured = light?.type === "environment" && light.image !== null;
     if (!pictured)
-      new TripleControl(folder, field("radiance", "Equal from all directions, linear RGB.", (l) => (l as { constant: number[] }).constant ?? [], (l, v) => Object.assign(l, { constant: v }), "W/(m² sr)"), { low: 0, high: null, color: false });
-    new RangeControl(folder, field("scale", "Factor of its radiance.", (l) => (l as { scale: number }).scale, (l, v) => Object.assign(l, { scale: v })), { low: 0.01, high: 100, scale: "log", open: true });
+      new TripleControl(folder, field("radiance", "Radiance, equal from all directions, in linear RGB.", (l) => (l as { constant: number[] }).constant ?? [], (l, v) => Object.assign(l, { constant: v }), "W/(m² sr)"), { low: 0, high: null, color: false });
+    new RangeControl(folder, field("scale", "Factor by which the radiance is multiplied.", (l) => (l as { scale: number }).scale, (l, v) => Object.assign(l, { scale: v })), { low: 0.01, high: 100, scale: "log", open: true });
     if (pictured) {
-      new RangeControl(folder, field("rotation", "Angle about the vertical.", (l) => (l as { rotation: number }).rotation * DEGREES, (l, v) => Object.assign(l, { rotation: v / DEGREES }), "degrees"), { low: -180, high: 180 });
+      new RangeControl(folder, field("rotation", "Rotation of the environment about the vertical.", (l) => (l as { rotation: number }).rotation * DEGREES, (l, v) => Object.assign(l, { rotation: v / DEGREES }), "degrees"), { low: -180, high: 180 });
       new ChoiceControl(
         folder,
         {
           label: "integral",
-          doc: "How the light of the picture is integrated over directions.",
+          doc: "Method by which the light of the picture is integrated over directions.",
           get: () => app.state.environment,
           set: (value) => app.store.set("environment", value as EnvironmentMethod),
           initial: () => "sampled",
         },
         () => [
-          { value: "sampled", label: "sampled, brute force", doc: "Multiple importance sampling by the material's own sample() and by the picture's brightness, accumulated until it converges. While there are few samples, a share of the split sum is added to reduce the error." },
-          ...(app.data.dfg.length ? [{ value: "dfg", label: "split sum, table", doc: "F0 A + B (Karis 2013) times the blurred picture, as in game engines. Materials with compensation, or without F, take their own albedo." }] : []),
-          { value: "split-sum", label: "split sum, own albedo", doc: "Albedo times the picture blurred by the lobe, both computed by the material's own sample()." },
+          { value: "sampled", label: "sampled", doc: "Multiple importance sampling by the material's own sample() and by the picture's brightness, accumulated until the result converges. At low sample counts, a fraction of the split sum is added to reduce the error." },
+          ...(app.data.dfg.length ? [{ value: "dfg", label: "split sum, table", doc: "F0 A + B (Karis 2013) times the blurred picture, as in game engines. For materials with compensation, or without F, the material's own albedo is used." }] : []),
+          { value: "split-sum", label: "split sum, computed albedo", doc: "Albedo times the picture blurred by the lobe, both computed by the material's own sample()." },
         ],
       );
     }
-    const drop = button(pictured ? "Other picture…" : "Picture (.hdr)…", "Open a Radiance picture, or drop one on the balls.", () => this.openFile("environment"));
+    const drop = button(pictured ? "Other picture…" : "Picture (.hdr)…", "Open a Radiance file, or drop one on the picture.", () => this.openFile("environment"));
     const clear = button("No picture", "Replace the picture by a constant radiance.", () =>
       app.store.update(`lights.${index}`, (state) => Object.assign(state.lights[index] as Light, { image: null })),
     );

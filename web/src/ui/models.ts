@@ -89,7 +89,7 @@ export class ModelsSection {
           initial: () => "",
         },
         () => [
-          ...(edits.currentPreset(app, slot, material) ? [] : [{ value: "", label: "own values" }]),
+          ...(edits.currentPreset(app, slot, material) ? [] : [{ value: "", label: "custom values" }]),
           ...material.presets.map((p) => ({ value: p.name, label: p.name, disabled: !edits.possiblePreset(app, slot, p) })),
         ],
         () => material.presets.find((p) => p.name === edits.currentPreset(app, slot, material))?.f0 ?? null,
@@ -174,7 +174,7 @@ export class ModelsSection {
         edits.possibleChoices(app, slot, parameter).map(({ value, doc, here }) => ({
           value,
           label: value,
-          doc: here || app.data.socket ? doc : `${doc} (not in this page: open it with gonio view)`,
+          doc: here || app.data.socket ? doc : `${doc} (not available on this page; use gonio view)`,
           disabled: !here && !app.data.socket,
         })),
     );

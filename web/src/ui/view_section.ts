@@ -11,16 +11,16 @@ import { button, element, segmented } from "./dom";
 
 const TERM_LABELS: Record<Term, [string, string]> = {
   full: ["Full", "The whole material under all lights."],
-  D: ["D", "Distribution of microfacet normals at the half vector, in 1/sr, of the first light. It may need a lower exposure."],
+  D: ["D", "Distribution of microfacet normals at the half vector of the first light, in 1/sr. A lower exposure may be necessary."],
   G: ["G", "Masking and shadowing for the first light."],
   F: ["F", "Fresnel reflectance at the half vector of the first light."],
-  single: ["Single", "Light scattered once by the facets: the base alone."],
-  multi: ["Multi", "Light scattered more than once: the compensation's addition."],
-  compensated: ["Compensated", "Single and multi together. A row without compensation shows its single scattering."],
-  difference: ["Full − single", "The compensation's addition: positive orange, negative blue, zero black."],
+  single: ["Single", "Light scattered once by the facets: the base material without compensation."],
+  multi: ["Multi", "Light scattered more than once: the term added by the compensation."],
+  compensated: ["Compensated", "Single and multiple scattering together. A row without compensation shows its single scattering."],
+  difference: ["Full − single", "The term added by the compensation: positive values are orange, negative values are blue, and zero is black."],
   split: ["Split sum", "The approximation of game engines: albedo times the blurred environment. Full is the reference."],
-  "split-error": ["Split − full", "Error of the split sum: too bright orange, too dark blue, none black."],
-  rows: ["Row A − row", "The first row minus each other row: positive orange, negative blue, zero black."],
+  "split-error": ["Split − full", "Error of the split sum: orange where it is too bright, blue where it is too dark, and black where there is no error."],
+  rows: ["Row A − row", "The first row minus each of the other rows: positive values are orange, negative values are blue, and zero is black."],
 };
 
 /** The bar above the picture that selects a term, and a line that explains the picture where necessary. */
@@ -57,7 +57,7 @@ function unseen(app: PageApp, slots: number[]): string {
   if (lights.length === 0) return "No light is on.";
   if (lights.some((light) => light.type === "environment")) return "";
   const mirrors = slots.filter((slot) => app.shaderOf(slot).manifest.delta === "always").map((slot) => String.fromCharCode(65 + slot));
-  return mirrors.length ? `${mirrors.join(", ")}: a mirror reflects an environment only; its single direction never hits these lights.` : "";
+  return mirrors.length ? `${mirrors.join(", ")}: a mirror reflects an environment only; these lights are not sampled in its single direction of reflection.` : "";
 }
 
 export class ViewSection {
@@ -80,30 +80,30 @@ export class ViewSection {
         { value: "sphere", label: "sphere, exact" },
         { value: "shaderball", label: "shader ball" },
         { value: "torus", label: "torus" },
-        { value: "file", label: app.hasMeshFile() ? "own file" : "own file…" },
+        { value: "file", label: app.hasMeshFile() ? "custom mesh" : "custom mesh…" },
       ],
     );
     new ChoiceControl(
       gui,
       {
-        label: "Behind",
+        label: "Background",
         doc: "What is visible behind the balls.",
         get: () => (app.state.furnace ? "environment" : app.state.view.background),
         set: (value) => store.set("view.background", value === "environment" ? "environment" : "theme"),
         initial: () => "theme",
       },
       () => [
-        { value: "theme", label: "paper" },
+        { value: "theme", label: "plain" },
         { value: "environment", label: "environment" },
       ],
     );
     new RangeControl(gui, { label: "Exposure", doc: "Exposure in stops, applied before the tone curve.", unit: "stops", get: () => app.state.display.exposure, set: (v) => store.set("display.exposure", v), initial: () => store.initial.display.exposure }, { low: -8, high: 8, open: false });
     new ChoiceControl(
       gui,
-      { label: "Tone curve", doc: "Mapping of radiance to the display range, before sRGB.", get: () => app.state.display.tone, set: (tone) => store.set("display.tone", tone as State["display"]["tone"]), initial: () => store.initial.display.tone },
+      { label: "Tone curve", doc: "Mapping of radiance to the display range, before sRGB encoding.", get: () => app.state.display.tone, set: (tone) => store.set("display.tone", tone as State["display"]["tone"]), initial: () => store.initial.display.tone },
       () => Object.entries(TONES).map(([value, { doc }]) => ({ value, label: value, doc })),
     );
-    new TickControl(gui, { label: "Labels", doc: "Names under the balls and at the rows. Key: L", get: () => app.state.view.labels, set: (on) => store.set("view.labels", on), initial: () => true });
+    new TickControl(gui, { label: "Labels", doc: "Labels of the balls and of the rows. Key: L", get: () => app.state.view.labels, set: (on) => store.set("view.labels", on), initial: () => true });
     addRow(gui, element("div", { class: "buttons" }, button("Reset camera", "Restore the initial view (double-click the picture)", () => resetCamera(store))));
   }
 

@@ -1,10 +1,11 @@
-"""Every Gonio model as a Mitsuba plugin, through one generic adapter: `conductor` becomes `gonio_conductor`, and so on.
+"""Make every Gonio model available as a Mitsuba plugin: `conductor` becomes `gonio_conductor`, and so on.
 
-The properties of a plugin have the names of the model's parameters. Every plugin takes two more: `two_sided` (shades
-both sides, without the nested call of Mitsuba's own `twosided`) and, if the model has presets, `preset`.
+The properties of a plugin have the names of the model's parameters. Every plugin has two further properties:
+`two_sided` shades both sides, without the nested call of Mitsuba's `twosided` plugin, and `preset` selects a preset, if
+the model has presets.
 
-In polarized variants a plugin returns Mueller matrices for light that is reflected or refracted by single facets; all
-other light leaves unpolarized.
+In polarized variants, a plugin returns Mueller matrices for light that is reflected or refracted once, by a microfacet.
+All other light leaves unpolarized.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _models: dict[str, type[BSDF]] = {}  # plugin -> the newest model of that name
 
 
 def register(mi: ModuleType) -> None:
-    """Register every model with the current variant, including those that are declared later."""
+    """Register every model with the current variant, including models that are declared later."""
     BSDF.family.watch(_joined)
     if mi.variant() is not None:
         for name, model in models().items():
@@ -33,7 +34,7 @@ def register(mi: ModuleType) -> None:
 
 
 def register_model(mi: ModuleType, model: type[BSDF]) -> str:
-    """Name of a model's plugin, which is registered here if it is a user's class; call `register` first."""
+    """The name of a model's plugin, which is registered if it is a user's class. `register` must be called before."""
     if models().get(model.name) is model:
         return plugin_name(model.name)
     name = f"gonio_own_{model.name.replace('-', '_')}"

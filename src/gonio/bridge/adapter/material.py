@@ -1,4 +1,4 @@
-"""A material in a Mitsuba scene: reads its parameters from a plugin's properties and binds them at the hit points."""
+"""A material in a Mitsuba scene, whose parameters are read from properties of a plugin and bound at hit points."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from .variant import Variant
 
 
 def plugin_name(model_name: str) -> str:
-    """Name of a model's plugin: "blinn-phong" is `gonio_blinn_phong`."""
+    """The name of a model's plugin: that of "blinn-phong" is `gonio_blinn_phong`."""
     return "gonio_" + model_name.replace("-", "_")
 
 
 class PlacedMaterial:
-    """A material and the sources of its values.
+    """A material and the sources of its parameter values.
 
-    model    the material with plain values, from which its facts follow: a texture is represented by its range, a
-             Mitsuba plugin inside it by a `MitsubaBSDF`
-    slots    the source of each numeric parameter's value
-    inner    plugins of the nested materials: Mitsuba's, and Gonio's with their placed materials
-    derived  quantities derived from the parameters, computed once if these are the same at every hit
+    model    the material with plain values, from which its properties are determined; a texture is represented by its
+             range, and a nested Mitsuba plugin by a `MitsubaBSDF`
+    slots    source of the value of each numeric parameter
+    inner    plugins of the nested materials: Mitsuba's plugins, and Gonio's with their placed materials
+    derived  quantities derived from the parameters, computed once if the parameters are the same at every hit
     """
 
     def __init__(self, variant: Variant, props: Properties, model: type[BSDF]) -> None:
@@ -56,7 +56,7 @@ class PlacedMaterial:
             hint = did_you_mean(unknown[0], [*model.parameters(), "two_sided"])
             raise InputError(f"unknown property '{unknown[0]}'", self.name, hint)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the slots have warned
+            warnings.simplefilter("ignore")  # the slots have already issued these warnings
             self.model: BSDF = model(**values)
         if variant.channels != 3 and any(inner.only_rgb for _, inner in tree.walk(self.model)):
             what = f"{self.model.name} supports only red, green and blue, but {variant.mi.variant()} is set"
@@ -75,12 +75,12 @@ class PlacedMaterial:
         return child, getattr(child, "placed", None) or MitsubaBSDF(child)
 
     def derive(self) -> None:
-        """Compute the derived quantities once if the values are the same at every hit."""
+        """Compute the derived quantities once, if the parameter values are the same at every hit."""
         self.derived = None
         if self.varies and self.model.needs_uniform:
             what = "a texture given, but this base needs tables, which are computed for colors and numbers"
             raise InputError(what, f"{self.name}.base", "conductor and dielectric take textures")
-        guide_search.prepare(self.model)  # here, since no guide can be built while an integrator records a loop
+        guide_search.prepare(self.model)  # here, because no guide can be computed while an integrator records a loop
         if self.model.derives and not self.varies:
             self.derived = binding.evaluate_derived(
                 self.at(dr.zeros(self.variant.mi.SurfaceInteraction3f), True, inner=True)
@@ -88,8 +88,10 @@ class PlacedMaterial:
 
     @property
     def varies(self) -> bool:
-        """Whether a parameter of this material or of a nested one differs between hits, as textures do, and spectra,
-        which are evaluated at a ray's wavelengths."""
+        """Whether a parameter of this material or of a nested one differs between hits.
+
+        This is the case for textures, and for spectra, which are evaluated at the wavelengths of the ray.
+        """
         return (
             self._by_wavelength
             or any(slot.textures or slot.curves for slot in self.slots.values())
@@ -98,7 +100,7 @@ class PlacedMaterial:
 
     @property
     def _by_wavelength(self) -> bool:
-        """Whether the model reads the wavelengths of the rays."""
+        """Whether the model depends on the wavelengths of the rays."""
         return self.variant.spectral and self.model.reads_wavelengths
 
     @property
@@ -116,11 +118,11 @@ class PlacedMaterial:
         outer: Float | None = None,
         inner: bool = False,
     ) -> BSDF:
-        """The model with its parameters bound to their values at a surface interaction.
+        """The model, whose parameters are bound to their values at a surface interaction.
 
-        separates  whether a dispersive index is evaluated at the ray's first wavelength
-        outer      index outside the surface, by which the indices inside are divided
-        inner      whether it is part of another material, which alone then determines whether both sides are shaded
+        separates  whether a dispersive index is evaluated at the first wavelength of the ray
+        outer      index of refraction outside the surface, by which the indices inside are divided
+        inner      whether this material is nested in another, which then determines whether both sides are shaded
         """
         values = {name: slot.at(si, active, separates, outer) for name, slot in self.slots.items()}
         for name, (_, held) in self.inner.items():
@@ -132,12 +134,12 @@ class PlacedMaterial:
         if self.model.reads_surface:
             x, y = si.sh_frame.s, si.sh_frame.t
             values["surface"] = (dr.dot(si.dp_du, x), dr.dot(si.dp_dv, x), dr.dot(si.dp_dv, y))
-        # The derived quantities were computed for an index relative to vacuum.
+        # The derived quantities have been computed for indices relative to vacuum.
         bound = binding.bound_copy(self.model, values, self.derived if outer is None else None)
         return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound
 
     def traverse(self, callback: TraversalCallback) -> None:
-        """Report every value that may be changed to Mitsuba."""
+        """Report every value that can be changed to Mitsuba, through the callback."""
         flag = self.variant.mi.ParamFlags.Differentiable
         for slot in self.slots.values():
             for name, value in {**slot.values, **slot.textures}.items():
@@ -146,7 +148,7 @@ class PlacedMaterial:
             callback.put(name, plugin, flag)
 
     def changed(self) -> None:
-        """Update everything that depends on the values, after a change."""
+        """Update everything that depends on the values; called after a change."""
         for slot in self.slots.values():
             dr.make_opaque(*slot.values.values())
         if self.follows:
@@ -156,19 +158,22 @@ class PlacedMaterial:
 
     @property
     def follows(self) -> bool:
-        """Whether the model must have the current values, because tables are computed from them or because they can
-        switch off layers, which then have no code."""
+        """Whether the model must have the current parameter values.
+
+        This is the case if tables are computed from them, or if they can switch off layers, for which no code is then
+        generated.
+        """
         layers = any(leaf.parameter.off is not None for leaf in tree.leaves(self.model))
         return layers or bool(self.model.fixed)
 
     def now(self) -> BSDF:
-        """The model with its current values, where these are the same everywhere."""
+        """The model with the current values of the parameters that are constant over the surface."""
         inner = {name: held.now() for name, (_, held) in self.inner.items() if isinstance(held, PlacedMaterial)}
         return tree.rebuild(self.model, {**{name: slot.now() for name, slot in self.slots.items()}, **inner})
 
 
 def _preset(props: Properties, model: type[BSDF]) -> NamedPreset:
-    """The preset that the properties name; if they name none, a preset without values."""
+    """The preset named by the properties, or a preset without values if they name none."""
     known = model.presets()
     if "preset" not in props or not known:
         return NamedPreset("", {})

@@ -1,7 +1,7 @@
-"""The class of Gonio's plugins, which implements Mitsuba's BSDF interface with a placed material.
+"""The class of Gonio's plugins, which implements Mitsuba's BSDF interface for a `PlacedMaterial`.
 
-Only this module converts between the two conventions: Mitsuba names the direction toward the viewer `wi` and the
-sampled direction `wo`; in Gonio, `wo` points toward the viewer.
+Only this module converts between the conventions: in Mitsuba, `wi` points toward the viewer and `wo` is the sampled
+direction; in Gonio, `wo` points toward the viewer.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from .variant import DISPERSES, NESTS, SEPARATES, Variant
 
 
 def plugin_class(mi: ModuleType) -> OfVariant:
-    """The class of the plugins for the current variant, derived from Mitsuba's BSDF.
+    """The class of Gonio's plugins for the current variant, which derives from Mitsuba's BSDF.
 
-    It is constructed from a plugin's properties and a model.
+    Its constructor takes the properties of a plugin and a model.
     """
     methods = {name: value for name, value in vars(_Methods).items() if name not in ("__dict__", "__weakref__")}
     return new_class("GonioBSDF", (mi.BSDF,), exec_body=lambda names: names.update(methods, variant=Variant(mi)))
@@ -45,7 +45,7 @@ def _mode(mi: ModuleType, ctx: BSDFContext) -> Mode:
 
 
 def _enabled(mi: ModuleType, ctx: BSDFContext, wo: Vector, wi: Vector, active: Mask) -> Mask:
-    """Lanes on which the context requests the lobe, reflection or transmission."""
+    """A mask of the lanes on which the context enables the lobe of the two directions, reflection or transmission."""
     kinds = mi.BSDFFlags
     reflect, transmit = bool(ctx.type_mask & int(kinds.Reflection)), bool(ctx.type_mask & int(kinds.Transmission))
     if reflect and transmit:
@@ -55,15 +55,17 @@ def _enabled(mi: ModuleType, ctx: BSDFContext, wo: Vector, wi: Vector, active: M
 
 
 def _at(placed: PlacedMaterial, ctx: BSDFContext, si: SurfaceInteraction, active: Mask) -> BSDF:
-    """The material bound at a hit; the integrator's type mask determines whether the index outside and the first
-    wavelength are used."""
+    """The material, bound to its parameters at a hit.
+
+    The type mask of the integrator determines whether the index outside the surface and the first wavelength are used.
+    """
     mask = int(ctx.type_mask)
     outer = 1.0 + si.duv_dx.x if mask == NESTS else None
     return placed.at(si, active, mask in (SEPARATES, NESTS), outer)
 
 
 class _Methods:
-    """The methods of the plugins' class, which `plugin_class` copies, since nanobind allows a single base class."""
+    """The methods of the plugin class. `plugin_class` copies them, because nanobind allows only one base class."""
 
     variant: Variant
     placed: PlacedMaterial
@@ -101,7 +103,7 @@ class _Methods:
         self.placed.changed()
         if self.placed.follows:
             self._set_flags(self.placed.model.delta)
-        # An alpha that was 0 may have become positive: from now on the lobe may be delta or not.
+        # An alpha that was 0 may have become positive, so the lobe may now be either delta or smooth.
         if self.placed.model.delta == "always" and any(key.startswith("alpha") for key in keys):
             self._set_flags("maybe")
 
@@ -172,7 +174,7 @@ class _Methods:
     def _mueller(
         self, model: BSDF, ctx: BSDFContext, wo: Vector, wi: Vector, value: Radiance, total: Radiance, delta: Mask
     ) -> Radiance:
-        """The value as a Mueller matrix. In importance mode light travels the other way, from Gonio's wo to wi."""
+        """The value as a Mueller matrix. In importance mode, light travels in reverse, from Gonio's wo to wi."""
         mode = _mode(self.variant.mi, ctx)
         parts = model.polarized(wo, wi, delta, mode)
         total = dr.select(delta, sum((part.value for part in parts), dr.zeros(self.variant.spectrum)), total)

@@ -1,7 +1,7 @@
-"""The sources of a plugin's parameter values: numbers and colors held by Dr.Jit, or textures.
+"""The sources of a plugin's parameter values: Dr.Jit numbers and colors, or textures.
 
-Numbers and colors are opaque (a changed value recompiles nothing); textures are evaluated at each hit. A roughness may
-be given as `alpha`, or as `alpha_x` and `alpha_y`.
+Numbers and colors are opaque, so changing a value does not recompile kernels. Textures are evaluated at each hit. The
+roughness may be given as `alpha`, or as `alpha_x` and `alpha_y`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Plain: TypeAlias = OfVariant  # a number, a color or a pair of alphas, as a mate
 
 
 class NamedPreset(NamedTuple):
-    """The short name of a preset, and its values."""
+    """A preset: its short name and its values."""
 
     name: str
     values: Mapping[str, Plain]
@@ -33,10 +33,10 @@ class NamedPreset(NamedTuple):
 class Slot:
     """A numeric parameter of a plugin.
 
-    values    opaque values by property ("alpha", or "alpha_x" and "alpha_y")
-    textures  textures by property
-    curves    dispersive indices by property: eta at each nanometer
-    plain     plain numbers within the parameter's range; for a texture, the lowest and the highest value
+    values    opaque values, by property ("alpha", or "alpha_x" and "alpha_y")
+    textures  textures, by property
+    curves    dispersive indices of refraction, by property: eta at each nanometer
+    plain     plain numbers within the range of the parameter; for a texture, its lowest and highest value
     """
 
     def __init__(self, variant: Variant, props: Properties, parameter: Parameter, location: str, preset: NamedPreset):
@@ -58,7 +58,7 @@ class Slot:
         return both
 
     def _read(self, props: Properties, name: str, preset: NamedPreset) -> Plain:
-        """Read one property, the preset's value, or the default, into `values` or `textures`."""
+        """Read a property, or else the value of the preset or the default, into `values` or `textures`."""
         parameter, variant = self.parameter, self.variant
         kinds = variant.mi.Properties.Type
         if name in props:
@@ -77,7 +77,7 @@ class Slot:
                 if np.max(color) > 1.0:
                     return self._through_rgb(name, color)
                 self._texture(name, props.get_unbounded_texture(name))
-                return color  # it does not vary over the surface
+                return color  # a color does not vary over the surface
             return self._texture(name, props.get_unbounded_texture(name))
         if parameter.required and name not in preset.values:
             raise InputError("missing", self.location, parameter.doc)
@@ -91,7 +91,7 @@ class Slot:
         return value
 
     def _through_rgb(self, name: str, value: Any) -> Plain:
-        """A spectrum through a color that may exceed 1, as indices of refraction do."""
+        """A spectrum for a color that may exceed 1, as indices of refraction do."""
         if np.min(value) < 0.0:
             what = f"{np.min(value):g} given, but a negative color has no spectrum"
             raise InputError(what, self.location, "render it in an RGB variant, such as llvm_ad_rgb")
@@ -102,7 +102,7 @@ class Slot:
     def _constant(self, name: str, value: Plain) -> Plain:
         self.parameter.check(value, self.location)
         if self.parameter.kind == "angle" and value == 0:
-            return value  # static: no rotation is compiled
+            return value  # a constant, so no code for a rotation is compiled
         if self.variant.spectral and isinstance(value, DispersiveIndex) and value.constants.disperses:
             self.curves[name] = self.variant.dispersion(value.constants)
         if self.parameter.kind == "spectrum":
@@ -119,7 +119,7 @@ class Slot:
                 self.values[name] = color
                 return np.broadcast_to(np.asarray(color).ravel(), 3)
         self.textures[name] = texture
-        span = getattr(texture, "span", None)  # Gonio's textures have one
+        span = getattr(texture, "span", None)  # Gonio's textures have this method
         if span is not None:
             for plain in span:
                 self.parameter.check(plain if self.parameter.kind == "spectrum" else float(plain[0]), self.location)
@@ -133,7 +133,7 @@ class Slot:
         return any(texture.is_spatially_varying() for texture in self.textures.values())
 
     def now(self) -> Plain:
-        """Plain numbers for the current values, clamped to the parameter's range; `plain` for textures and curves."""
+        """The current values as numbers, clamped to the range of the parameter; `plain` for textures and curves."""
         if self.textures or self.curves or self.variant.spectral or not self.values:
             return self.plain
         parameter = self.parameter
@@ -148,10 +148,10 @@ class Slot:
     def at(
         self, si: SurfaceInteraction, active: Mask, separates: bool = False, outer: Float | None = None
     ) -> OfVariant:
-        """The bound value at a surface interaction, as `Parameter.bind` returns it.
+        """The value at a surface interaction, in the form that `Parameter.bind` returns.
 
-        separates  whether a dispersive index is evaluated at the ray's first wavelength
-        outer      index outside the surface, by which an index is divided
+        separates  whether a dispersive index is evaluated at the first wavelength of the ray
+        outer      index of refraction outside the surface, by which an index is divided
         """
         kind = self.parameter.kind
         result = dict(self.values)

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Re-raise a KeyboardInterrupt inside the block as a KeyboardInterrupt."""
+    """Make a KeyboardInterrupt inside the `with` block leave it as a KeyboardInterrupt."""
     try:
         yield
     except RuntimeError as error:

@@ -1,7 +1,8 @@
 """Dr.Jit 1.5: kernels with loops and calls depend on the order in which the arrays that they read were created.
 
-Observed with the maps of `caustics`: the kernel was compiled again if a map was created before the sums instead of
-after them; tests/render/test_transport.py counts the kernels. No short reproduction is known, hence no canary.
+This was observed with the photon maps of `caustics`: the kernel was compiled again if a map was created before the
+accumulated samples instead of after them; tests/render/test_transport.py counts the kernels. No short reproduction is
+known, so there is no canary test.
 
 Workaround: copy all arrays of an object, one after another, immediately before a kernel reads them.
 """

@@ -17,6 +17,6 @@ from ..types import Float, PositionSample
 
 
 def with_radial_normal(mi: ModuleType, ps: PositionSample, sphere: Float) -> PositionSample:
-    """The position sample with the sphere's true normal; `sphere` is (center, signed radius), 0 for other shapes."""
+    """The position sample with the correct normal; `sphere` is (center, signed radius), or 0 for other shapes."""
     ps.n = dr.select(sphere.w != 0.0, mi.Normal3f((ps.p - mi.Point3f(sphere.xyz)) / sphere.w), ps.n)
     return ps

@@ -4,8 +4,8 @@
     walls = {f"s{k}": {"type": "rectangle", "bsdf": kinds[k // 3]} for k in range(9)}
     [kinds.index(mesh.bsdf()) for mesh in mi.load_dict({"type": "merge", **walls})]     # [2, 1, 0], by address
 
-Meshes of equal material are merged in the order of the material's address. The order of the shapes determines that of
-the lights, the kernels, and the last bits of every picture.
+Meshes of equal material are merged in the order of the memory address of the material. The order of the shapes
+determines the order of the lights, the kernels, and the last bits of every picture.
 
 Workaround: sort by properties that do not change between runs.
 """
@@ -28,7 +28,7 @@ def light_key(emitter: Emitter) -> tuple[str, list[float]]:
 
 def shape_key(shape: Plugin) -> tuple[str, list[float], int, bytes]:
     """A sort key for shapes that does not change between runs."""
-    if shape.id():  # a shape of the scene; merged ones have no names
+    if shape.id():  # a shape of the scene; merged shapes have no names
         return shape.id(), [], 0, b""
     box = shape.bbox()
     corners = [float(x) for corner in (box.min, box.max) for x in np.ravel(corner)]

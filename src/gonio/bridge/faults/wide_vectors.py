@@ -1,13 +1,14 @@
-"""Dr.Jit 1.5: on processors with AVX-512 all kernels have 16 lanes, which take two registers per 64-bit value.
+"""Dr.Jit 1.5: on processors with AVX-512, all kernels have 16 lanes, so a double-precision value takes two registers.
 
     x = dr.arange(mi.Float64, 16)
-    dr.eval(x * x)                                         # a register has 8
+    dr.eval(x * x)                                         # a register holds 8 values
 
-The derivatives of OpenPBR in 64 bits, 76,000 operations, take 122 s to compile, but 19 s with 8 lanes: LLVM needs
-several times as long to allocate registers, and the kernel runs no faster. No public Python function sets the number of
-lanes; libdrjit-core exports one.
+The derivatives of OpenPBR in double precision, 76,000 operations, take 122 s to compile, but only 19 s with 8 lanes.
+With 16 lanes, LLVM takes several times as long to allocate registers, and the kernel runs no faster. There is no public
+Python function that sets the number of lanes, but libdrjit-core exports one.
 
-Workaround: `narrow` compiles with 8 lanes inside a `with` block, for large kernels of 64-bit values that run once.
+Workaround: inside a `with` block, `narrow` compiles with 8 lanes. It is used for large double-precision kernels that
+run once.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def lanes() -> int:
 
 @contextlib.contextmanager
 def narrow() -> Iterator[None]:
-    """Compile the kernels of the block for 8 lanes if they would have more. The last bits of results may differ."""
+    """Compile kernels in the `with` block for at most 8 lanes. The last bits of results may differ."""
     core = _core()
     before = lanes()
     if core is None or before <= LANES:
@@ -51,7 +52,7 @@ def _core() -> ctypes.CDLL | None:
     path = Path(str(dr.__file__)).parent / "libdrjit-core.so"
     if not path.is_file() or not dr.has_backend(dr.JitBackend.LLVM):
         return None
-    dr.eval(dr.opaque(dr.llvm.Float, 1.0))  # the backend starts with the first array
+    dr.eval(dr.opaque(dr.llvm.Float, 1.0))  # the first array initializes the backend
     core = ctypes.CDLL(str(path))
     names = ("_Z21jit_llvm_vector_widthv", "_Z19jit_llvm_target_cpuv", "_Z24jit_llvm_target_featuresv")
     return core if all(hasattr(core, name) for name in (*names, "_Z19jit_llvm_set_targetPKcS0_j")) else None

@@ -1,10 +1,10 @@
-"""Files that describe materials, such as glTF: the interface of a format, and the strings that name a file's material.
+"""Files that describe materials, such as glTF: the interface of formats, and strings that name a material in a file.
 
-    chest.gltf                  the file's only material
-    chest.gltf:Wood             one of several, by its name, or by its number if it has no unique name
+    chest.gltf                  the only material of the file
+    chest.gltf:Wood             one of several materials, by its name, or by its number if it has no unique name
     gold.json                   a result of `gonio fit`, or Gonio's own notation
 
-A reader translates a material to Gonio's notation (`notation`), a tree of types and values; the formats are the modules
+A reader converts a material to Gonio's notation (`notation`), a tree of types and values. The formats are the modules
 of this package.
 """
 
@@ -23,15 +23,15 @@ from ...errors import GonioWarning, InputError, did_you_mean
 from ...material import is_model
 from ...members import Family, instances_of
 
-# {"type": "conductor", "alpha": 0.3, ...}; a value may be a material, or an image: {"type": "imageTex", ...}
+# {"type": "conductor", "alpha": 0.3, ...}; a value may be a material or an image, {"type": "imageTex", ...}
 Notation: TypeAlias = "dict[str, object]"
 
 
 class Described(NamedTuple):
     """A material as described by a file.
 
-    notation  the material in Gonio's notation, including images, as in a scene
-    notices   features that the notation cannot express, one sentence each
+    notation  the material in Gonio's notation, with images as in a scene
+    notices   features of the file that the notation cannot express, one sentence each
     """
 
     notation: Notation
@@ -41,8 +41,8 @@ class Described(NamedTuple):
 class Document:
     """A file format.
 
-    name      the format's type in scenes: {"type": "gltf", "file": ...}
-    suffixes  suffixes by which its files are recognized
+    name      type of the format in scenes, as in {"type": "gltf", "file": ...}
+    suffixes  suffixes by which files are recognized
     writes    name of the material type that `write` accepts; "" if the format cannot be written
     """
 
@@ -52,27 +52,27 @@ class Document:
     writes: ClassVar[str] = ""
 
     def holds(self, path: Path) -> bool:
-        """Whether a file with a suffix of the format describes materials; other files may have the suffix too."""
+        """Whether a file with a suffix of this format describes materials, because other files may have it too."""
         return True
 
     def materials(self, path: Path) -> list[str]:
-        """The names by which a file's materials are selected. Raises InputError for a file of another format."""
+        """The names by which the materials in a file are selected. Raises InputError for a file in another format."""
         raise NotImplementedError
 
     def ranked(self, path: Path) -> bool:
-        """Whether a file's first material is the default: the best of several fits."""
+        """Whether the first material of a file is the default, because it is the best of several fits."""
         return False
 
     def read(self, path: Path, name: str) -> Described:
-        """A file's material of that name. Raises InputError for a file of another format."""
+        """Read the material with the given name. Raises InputError for a file in another format."""
         raise NotImplementedError
 
     def image(self, path: Path, index: str) -> bytes:
-        """The bytes of an image inside a file; textures refer to it as FILE#INDEX."""
+        """The bytes of an image inside a file, to which textures refer as FILE#INDEX."""
         raise InputError(f"no picture '{index}' in this file", str(path))
 
     def write(self, notation: Notation, name: str) -> bytes:
-        """The bytes of a file with one material of the type `writes`, under that name."""
+        """The bytes of a file with one material of the type `writes` and the given name."""
         raise InputError(f"{self.name} files cannot be written", "OUT", "choose another suffix")
 
 
@@ -82,12 +82,12 @@ Document.family = Family(
 
 
 def types() -> list[str]:
-    """The types of document files in scenes: {"type": "gltf", "file": ...}."""
+    """The types of document files in scenes, as in {"type": "gltf", "file": ...}."""
     return list(Document.family.all())
 
 
 def parted(text: str) -> tuple[Document, Path, str] | None:
-    """Format, file and material of FILE or FILE:MATERIAL; None if the string names no such file."""
+    """The format, file and material of FILE or FILE:MATERIAL; None if the string does not name a document."""
     for document in Document.family.all().values():
         for suffix in document.suffixes:
             match = re.fullmatch(rf"(.+?{re.escape(suffix)})(?::(.+))?", text, re.IGNORECASE | re.DOTALL)
@@ -97,20 +97,20 @@ def parted(text: str) -> tuple[Document, Path, str] | None:
 
 
 def names_document(text: str) -> bool:
-    """Whether a string is FILE or FILE:MATERIAL of such a format."""
+    """Whether a string names a document, as FILE or FILE:MATERIAL."""
     return parted(text) is not None
 
 
 def inside(text: str) -> tuple[str, str]:
-    """File and number of FILE#NUMBER, an image inside a document; the string itself and "" for any other file."""
+    """Split FILE#NUMBER, an image inside a document, into file and number; for other files, the number is ""."""
     file, mark, index = text.rpartition("#")
     return (file, index) if mark and names_document(file) else (text, "")
 
 
 def read(document: Document, path: Path, name: str = "") -> Described:
-    """A material of a file, or its only one if no name is given.
+    """Read a material from a file, by its name, or the only material if no name is given.
 
-    Raises InputError, with the closest known name, if the file has no material of that name.
+    Raises InputError, with the closest known name, if the file has no material with the given name.
     """
     if not path.is_file():
         raise InputError(f"no file '{path}'", str(path))
@@ -127,7 +127,7 @@ def read(document: Document, path: Path, name: str = "") -> Described:
 
 
 def described(text: str) -> dict[str, Notation]:
-    """The notation of every material of FILE, or of FILE:MATERIAL, by its name."""
+    """The notation of all materials in FILE, or of FILE:MATERIAL, by the name of the material."""
     parts = parted(text)
     assert parts is not None, "asked before"
     document, path, name = parts
@@ -136,7 +136,7 @@ def described(text: str) -> dict[str, Notation]:
 
 
 def without_pictures(text: str) -> Notation:
-    """The notation of FILE or FILE:MATERIAL with numbers only; a GonioWarning names omitted images."""
+    """The notation of FILE or FILE:MATERIAL without images; a GonioWarning names the omitted images."""
     parts = parted(text)
     assert parts is not None, "asked before"
     described = read(*parts)
@@ -151,10 +151,10 @@ def without_pictures(text: str) -> Notation:
 
 
 def convert(source: str, output: Path) -> tuple[str, ...]:
-    """Write a document's material as JSON in Gonio's notation, or as another document. Returns the notices.
+    """Convert a material in a document to JSON in Gonio's notation, or to another document format. Returns the notices.
 
     source  FILE or FILE:MATERIAL
-    output  the file to write: .json, or the suffix of a document's format
+    output  the file to write, with the suffix .json or that of a document format
     """
     operand = parted(source)
     if operand is None:
@@ -165,9 +165,9 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
 
 
 def write(notation: Notation, output: Path) -> None:
-    """Write a material as JSON in Gonio's notation, or as a document, as the suffix of `output` determines.
+    """Write a material as JSON in Gonio's notation or as a document, depending on the suffix of `output`.
 
-    Raises InputError for an unknown suffix, and for a material that the format cannot hold.
+    Raises InputError for an unknown suffix, and for a material that the format cannot store.
     """
     files.check_file(output)
     if output.suffix.lower() == ".json":
@@ -184,11 +184,11 @@ def write(notation: Notation, output: Path) -> None:
     files.write_whole(output, target.write(notation, output.stem))
 
 
-PREFIX = "gonio-"  # of types in scenes, where some names without it are the lab's, with other defaults
+PREFIX = "gonio-"  # prefix of types in scenes, where some names without it are the lab's, with other defaults
 
 
 def for_scenes(notation: Mapping[str, object]) -> Notation:
-    """The notation with the type names of scene files, such as "gonio-conductor"."""
+    """The notation, with the type names of scene files, such as "gonio-conductor"."""
     return _with_types(notation, lambda name: PREFIX + name if is_model(name) else name)
 
 

@@ -1,4 +1,4 @@
-"""glTF 2.0: metallic-roughness with Khronos' extensions, as Gonio materials (Khronos2021, appendix B)."""
+"""Convert metallic-roughness materials of glTF 2.0 with extensions to Gonio materials (Khronos2021, appendix B)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from . import Described, Document, Notation
 from .gltf_file import LARGEST, GltfFile, Json
 
 WHITE = (1.0, 1.0, 1.0)
-NARROWEST = 2e-3  # smallest width under a sheen, since a sum cannot contain mirrors
-HIGHEST_INDEX = 3.0  # of a coat
-D_LINE, F_LINE, C_LINE = 0.5876, 0.4861, 0.6563  # um; the lines by which the Abbe number is defined
+NARROWEST = 2e-3  # smallest alpha under a sheen, because a sum cannot contain mirrors
+HIGHEST_INDEX = 3.0  # largest index of refraction of a coat
+D_LINE, F_LINE, C_LINE = 0.5876, 0.4861, 0.6563  # um; the spectral lines that define the Abbe number
 
-# Extensions that files may require, which do not concern materials or are read here
+# Extensions that files may require, because they are supported or do not concern materials
 KNOWN = {
     *(
         f"KHR_materials_{name}"
@@ -29,11 +29,11 @@ KNOWN = {
     ),
     "KHR_lights_punctual", "KHR_mesh_quantization", "KHR_node_visibility", "EXT_mesh_gpu_instancing",
 }  # fmt: skip
-TELLS = "KHR_materials_diffuse_transmission"  # read, with a notice that it is not supported
+TELLS = "KHR_materials_diffuse_transmission"  # accepted, with a notice that it is not supported
 
 
 class Gltf(Document):
-    """glTF's materials (.gltf, .glb)."""
+    """Materials in glTF files (.gltf, .glb)."""
 
     name: ClassVar[str] = "gltf"
     suffixes: ClassVar[tuple[str, ...]] = (".gltf", ".glb")
@@ -58,10 +58,10 @@ class Gltf(Document):
 
 
 class _Material:
-    """The translation of one material of a file.
+    """The conversion of one material of a file.
 
-    It is layered as in the specification, from the bottom: a dielectric, which is a clear layer over a diffuse one or
-    transmits; mixed with a metal; under sheen; under a clear coat; with holes.
+    As in the specification, the material consists of the following parts, from the bottom up: a dielectric, which is a
+    clear layer over a diffuse one, or transmits light; a mix with a metal; a sheen; a clear coat; and holes.
     """
 
     def __init__(self, file: GltfFile, index: int) -> None:
@@ -84,7 +84,7 @@ class _Material:
     # ------------------------------------------------------------------ reading
 
     def extension(self, name: str) -> tuple[Json, str]:
-        """An extension of the material, empty if it has none, and its location."""
+        """An extension of the material, which is empty if it is missing, and its location in the file."""
         key = f"KHR_materials_{name}"
         return self.file.member(self.extensions, key, f"{self.at}/extensions"), f"{self.at}/extensions/{key}"
 
@@ -140,7 +140,7 @@ class _Material:
         self._rest()
 
     def _rest(self) -> None:
-        """Read properties that are not part of a scattering function or cannot be expressed."""
+        """Read properties that are not part of the scattering function or cannot be expressed."""
         file, at = self.file, self.at
         normal = self.texture(self.own, "normalTexture", at)
         scale = file.number(file.member(self.own, "normalTexture", at), "scale", 1.0, at, -LARGEST, LARGEST)
@@ -159,16 +159,16 @@ class _Material:
         values, place = self.extension("diffuse_transmission")
         if file.number(values, "diffuseTransmissionFactor", 0.0, place, 0.0, 1.0) > 0.0:
             file.colour(values, "diffuseTransmissionColorFactor", WHITE, place)
-            self.notices.append("diffuse transmission is not supported: that light is reflected")
+            self.notices.append("diffuse transmission is not supported: this light is reflected")
 
     def leave(self, of: Mapping[str, object], at: str, *textures: str) -> None:
-        """Add notices for textures that are omitted."""
+        """Add notices about textures that are omitted."""
         for key in textures:
             if self.texture(of, key, at) is not None:
                 self.notices.append(f"{key} is omitted: only its factor is used")
 
     def texture(self, of: Mapping[str, object], key: str, at: str, srgb: bool = False) -> Notation | None:
-        """An image in the notation of scenes; None if there is none."""
+        """An image in the notation of scenes; None if there is no image."""
         if key not in of:
             return None
         file, at = self.file, f"{at}/{key}"
@@ -200,7 +200,7 @@ class _Material:
         return image_notation
 
     def _picture(self, image: Json, number: int) -> str:
-        """An image's file, relative to the glTF file; FILE#NUMBER if it is embedded."""
+        """The file of an image, relative to the glTF file, or FILE#NUMBER if the image is embedded."""
         at, uri = f"/images/{number}", image.get("uri")
         if uri is None:
             self.file.index(image, "bufferView", "bufferViews", at)
@@ -221,7 +221,7 @@ class _Material:
         return factor if texture is None or not factor else {**texture, "channel": channel, "factor": factor}
 
     def widths(self, anisotropic: bool = True) -> Notation:
-        """`alpha` from the roughness, or the parameter that an image drives."""
+        """`alpha` from the roughness, or the parameter that is given by an image."""
         if isinstance(self.roughness, dict):
             if self.anisotropy:
                 self.say("the anisotropy is omitted, since the roughness is a picture")
@@ -268,7 +268,7 @@ class _Material:
         if isinstance(self.base, dict):
             self.say("the film is omitted, since its metal's color is a picture")
             return plain
-        # only the reflectance of a metal is given; as in the specification, its index has no absorption
+        # only the reflectance of a metal is given, so its index has no absorption, as in the specification
         roots = [math.sqrt(min(r, 0.9999)) for r in self.base]  # type: ignore[attr-defined]
         filmed: Notation = {"type": "film-conductor", "eta": [(1.0 + r) / (1.0 - r) for r in roots], "k": 0.0}
         filmed |= {**self.widths(), **self._film()}
@@ -280,7 +280,7 @@ class _Material:
         return {"thickness": min(self.film, 3000.0), "film_eta": min(self.film_index, HIGHEST_INDEX)}
 
     def _opaque(self) -> Notation:
-        """A clear layer over a diffuse one, whose color is that of the layered material."""
+        """A clear layer over a diffuse one, whose color is the color of the layered material."""
         if self.iridescence:
             self.say("the film is omitted over the diffuse part")
         matt: Notation = {"type": "lambert", "albedo": self.base}
@@ -298,7 +298,7 @@ class _Material:
         return {"type": "coat", "base": matt, "index": index, "bounces": "white", **width}
 
     def _index(self) -> float:
-        """The index with the normal reflectance of ior and specular combined."""
+        """The index of refraction whose normal reflectance is that of ior and specular combined."""
         grey = sum(self.specular_colour) / 3.0
         if len(set(self.specular_colour)) > 1:
             self.say("specularColorFactor is replaced by its mean: a clear layer reflects without color")
@@ -320,7 +320,7 @@ class _Material:
         return min(index, HIGHEST_INDEX)
 
     def _clear(self) -> Notation:
-        """Glass: a solid if it has a volume, else a sheet."""
+        """Glass: a solid if the material has a volume, otherwise a thin sheet."""
         index = self._index()
         tint = {} if self.base == list(WHITE) else {"albedo": self.base}
         if tint:
@@ -338,7 +338,7 @@ class _Material:
         return glass
 
     def _dispersing(self, index: float) -> object:
-        """Cauchy's formula through the index at 587.6 nm, with V = 20 / dispersion."""
+        """Cauchy's formula with the given index at 587.6 nm and the Abbe number V = 20 / dispersion."""
         if not self.dispersion or self.iridescence:
             if self.dispersion:
                 self.say("the dispersion is omitted under a film")
@@ -347,7 +347,7 @@ class _Material:
         return f"cauchy({index - b / D_LINE**2:.9g}, {b:.9g})"
 
     def _sheened(self, body: Notation) -> Notation:
-        """Fibers on top; the layers below receive the light that the fibers do not reflect on average."""
+        """The material under a sheen; the layers below receive the average light that the sheen does not reflect."""
         if not any(self.sheen):
             return body
         alpha = self.sheen_roughness**2
@@ -388,7 +388,7 @@ def _mixed(a: Notation, b: Notation, weight: object) -> Notation:
     return {"type": "mix", "a": a, "b": b, "weight": weight}
 
 
-# For white `sheen-charlie`: (alpha, albedo for uniform illumination), measured by go.albedo
+# (alpha, albedo under uniform illumination) of a white `sheen-charlie`, computed with go.albedo
 ALBEDOS = (
     (0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0),
     (0.0624, 0.0777, 0.1010, 0.1226, 0.1615, 0.1954, 0.2244, 0.2486, 0.2681, 0.2830, 0.2934, 0.2996),

@@ -1,7 +1,7 @@
 """A validated glTF 2.0 file: .gltf with its external files, or .glb (Khronos2021, sec. 4).
 
-All content is untrusted: sizes are compared with the actual sizes and indices with the lists they point into, and
-external files must be in the file's own folder.
+All content is untrusted: stated sizes are compared to actual sizes, indices are compared to the lengths of lists, and
+external files must be in the folder of the file.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ...errors import InputError
 
 Json: TypeAlias = "dict[str, object]"
 
-MAX_BYTES = 1 << 30  # of a file: more is not plausible for materials
+MAX_BYTES = 1 << 30  # maximum size of a file; a larger one is not plausible for materials
 MOST_JSON = 64 << 20
-MOST_ITEMS = 1_000_000  # of a list, so that a check takes a second at most
+MOST_ITEMS = 1_000_000  # maximum length of a list, so that a check takes at most a second
 LARGEST = 1e18  # the limit of numbers in scenes
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
@@ -30,10 +30,10 @@ _PARTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 
 
 class GltfFile:
-    """A glTF file, validated on construction.
+    """A glTF file, which is validated on construction.
 
-    path  the file's path
-    root  the file's JSON object
+    path  path of the file
+    root  the JSON object in the file
     """
 
     def __init__(self, path: Path) -> None:
@@ -51,11 +51,11 @@ class GltfFile:
     # ------------------------------------------------------------------ access to the JSON
 
     def fail(self, what: str, at: str = "", hint: str = "") -> NoReturn:
-        """Raise InputError at a location in the file."""
+        """Raise InputError for a location in the file."""
         raise InputError(what, f"{self._where}#{at}" if at else self._where, hint)
 
     def items(self, key: str) -> list[Json]:
-        """The list of objects under a key at the top level, empty if it is missing."""
+        """The list of objects under a key at the top level; empty if it is missing."""
         if key not in self._lists:
             items = self.root.get(key, [])
             if not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
@@ -64,13 +64,13 @@ class GltfFile:
         return self._lists[key]
 
     def material_names(self) -> list[str]:
-        """Each material's name if it is unique, else its number."""
+        """The name of each material if it is unique, else its number."""
         given = [str(material.get("name", "")) for material in self.items("materials")]
         unique = {name for name, times in Counter(given).items() if name and times == 1 and not name.isdigit()}
         return [name if name in unique else str(index) for index, name in enumerate(given)]
 
     def member(self, of: Mapping[str, object], key: str, at: str) -> Json:
-        """A member that is an object, empty if it is missing; `at` is the location of `of` in the file."""
+        """A member that is an object; empty if it is missing. `at` is the location of `of` in the file."""
         member = of.get(key, {})
         if not isinstance(member, dict):
             self.fail("an object expected", f"{at}/{key}")
@@ -88,7 +88,7 @@ class GltfFile:
     def colour(
         self, of: Mapping[str, object], key: str, default: tuple[float, ...], at: str, high: float = 1.0
     ) -> tuple[float, ...]:
-        """A member that is a list of numbers from 0 to `high`, as many as in the default."""
+        """A member that is a list of numbers from 0 to `high`, with the same length as the default."""
         color = of.get(key, list(default))
         if not isinstance(color, list) or len(color) != len(default):
             self.fail(f"a list of {len(default)} numbers expected", f"{at}/{key}")
@@ -97,7 +97,7 @@ class GltfFile:
     def integer(
         self, of: Mapping[str, object], key: str, at: str, default: int | None = None, high: int = 1 << 40
     ) -> int:
-        """A member that is an integer from 0 to `high`; an error if it is missing and has no default."""
+        """A member that is an integer from 0 to `high`. Raises InputError if it is missing and there is no default."""
         number = of.get(key, default)
         if isinstance(number, bool) or not isinstance(number, int) or number < 0:
             self.fail("a whole number of 0 or more expected", f"{at}/{key}")
@@ -124,7 +124,7 @@ class GltfFile:
         return data[start : start + self.integer(view, "byteLength", at)]
 
     def local_file(self, uri: str, at: str) -> Path:
-        """The file at a relative URI. Raises InputError if it is outside the folder or does not exist."""
+        """The file at a relative URI. Raises InputError if the file is outside the folder or does not exist."""
         hint = "put the file into the same folder, or embed the data"
         if ":" in uri.split("/")[0] or uri.startswith(("//", "\\")):
             self.fail(f"'{uri[:60]}' is not a file in its folder", at, hint)
@@ -132,7 +132,7 @@ class GltfFile:
             folder = self.path.parent.resolve()
             path = (folder / unquote(uri)).resolve()
             inside, there = path.is_relative_to(folder), path.is_file()
-        except (OSError, ValueError, RuntimeError) as error:  # too long, a zero byte, circular links
+        except (OSError, ValueError, RuntimeError) as error:  # too long a name, a zero byte, or circular links
             self.fail(f"not a usable file name: {error}", at, hint)
         if not inside:
             self.fail(f"'{uri[:60]}' is outside its folder", at, hint)
@@ -141,7 +141,7 @@ class GltfFile:
         return path
 
     def data(self, uri: str, at: str) -> bytes:
-        """The content of a data: URI."""
+        """The content of a data URI."""
         head, comma, text = uri.partition(",")
         if not comma or not head.endswith(";base64"):
             self.fail("a data URI without ';base64,'", at)
@@ -164,7 +164,7 @@ class GltfFile:
         return self._bytes_of(self.local_file(uri, f"{at}/uri"))
 
     def _size(self, index: int) -> int:
-        """The actual number of bytes in a buffer; an external file is not read for this."""
+        """The actual number of bytes in a buffer, determined without reading external files."""
         uri = self.items("buffers")[index].get("uri")
         if isinstance(uri, str) and not uri.startswith("data:"):
             return self.local_file(uri, f"/buffers/{index}/uri").stat().st_size
@@ -180,7 +180,7 @@ class GltfFile:
             raise InputError(f"cannot be read: {error.strerror or error}", str(path)) from None
 
     def _chunks(self, data: bytes) -> tuple[bytes, bytes | None]:
-        """The JSON and the binary chunk of a .glb."""
+        """The JSON chunk and the binary chunk of a .glb file."""
         if len(data) < 20 or data[:4] != b"glTF":
             self.fail("not a glTF file: its first 20 bytes are not a .glb header")
         version, length = struct.unpack_from("<II", data, 4)
@@ -215,7 +215,7 @@ class GltfFile:
             root = json.loads(text.decode("utf-8-sig"), parse_constant=no_number)
         except RecursionError:
             self.fail("its JSON is nested too deeply")
-        except ValueError as error:  # also invalid UTF-8, and integers with more digits than Python converts
+        except ValueError as error:  # includes invalid UTF-8, and integers with more digits than Python can convert
             self.fail(f"not valid JSON: {str(error)[:200]}", hint="it is truncated or damaged")
         if not isinstance(root, dict):
             self.fail("an object expected", "/")
@@ -265,7 +265,7 @@ class GltfFile:
             self.fail(f"{count} entries end at byte {end} of a view of {view['byteLength']}", at)
 
     def _nodes(self) -> None:
-        """Check that every node has at most one parent and is not its own ancestor."""
+        """Check that every node has at most one parent, and that no node is its own ancestor."""
         nodes = self.items("nodes")
         parent: dict[int, int] = {}
         for index, node in enumerate(nodes):

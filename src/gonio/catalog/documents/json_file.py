@@ -1,7 +1,7 @@
-"""JSON files that describe a material: in Gonio's notation, or as the result of a fit, a capture or a compression.
+"""JSON files that describe materials: in Gonio's notation, or as the result of a fit, a capture or a compression.
 
 {"type": "gonio-conductor", "alpha": 0.3}             written by `gonio convert`
-{"fits": [{"notation": {"type": ...}}, ...]}          `gonio fit`: the best, or gold.json:2 for the second
+{"fits": [{"notation": {"type": ...}}, ...]}          `gonio fit`: the best fit, or gold.json:2 for the second
 [{"file": "gold.binary", "fits": [...]}, ...]         `gonio fit` of several files: all.json:gold.binary
 {"notations": {"shapes.0.material": {"type": ...}}}   `gonio fit --from`
 {"fit": {"notation": {"type": ...}}}                  `gonio capture`
@@ -22,14 +22,14 @@ from .. import outside
 from . import Described, Document, Notation, from_scenes
 
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | float | bool | None"
-LARGEST = 64 << 20  # bytes: a fit of a thousand files has less than ten million
+LARGEST = 64 << 20  # maximum size in bytes; a fit of a thousand files has less than ten million
 
 _read: dict[Path, tuple[tuple[int, int], dict[str, Json] | None]] = {}
-CACHED = 8  # files, the most recently used
+CACHED = 8  # number of most recently used files that stay in memory
 
 
 class JsonFile(Document):
-    """Gonio's own JSON (.json): materials in its notation, and the results of fits, captures and compressions."""
+    """Gonio's own JSON (.json): materials in the notation, and the results of fits, captures and compressions."""
 
     name: ClassVar[str] = "json"
     suffixes: ClassVar[tuple[str, ...]] = (".json",)
@@ -45,7 +45,7 @@ class JsonFile(Document):
 
     def read(self, path: Path, name: str) -> Described:
         entry = (_entries(path) or {})[name]
-        if isinstance(entry, str):  # from an earlier version, or a class without a file
+        if isinstance(entry, str):  # written by an earlier version, or a class without a file
             hint = f"name the material itself: '{entry}'"
             raise InputError("it holds the material only as a string, which is not read from files", str(path), hint)
         if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
@@ -54,7 +54,7 @@ class JsonFile(Document):
 
 
 def _entries(path: Path) -> dict[str, Json] | None:
-    """The description of each material in a file, by name; None if the file is missing or has other content."""
+    """The description of each material in a file, by name; None if the file is missing or contains other data."""
     try:
         about = path.stat()
         stamp = (about.st_mtime_ns, about.st_size)
@@ -72,7 +72,7 @@ def _entries(path: Path) -> dict[str, Json] | None:
 
 
 def _materials_in(content: Json) -> Iterator[tuple[str, Json]]:
-    """Name and description of each material; empty for other content, such as a scene."""
+    """The name and description of each material; empty for other content, such as a scene."""
     if isinstance(content, list):
         rows = [row for row in content if isinstance(row, dict)]
         names = [str(row.get("file") or row.get("path")) for row in rows]
@@ -101,8 +101,10 @@ def _materials_in(content: Json) -> Iterator[tuple[str, Json]]:
 
 
 def _located(notation: Mapping[str, object], folder: Path, where: str, depth: int = 0) -> Notation:
-    """The notation with file paths relative to a folder made absolute. Raises InputError for a document inside a
-    document, and for too many nested materials."""
+    """The notation, in which file paths relative to a folder are converted to absolute ones.
+
+    Raises InputError for a document inside a document, and for too many nested materials.
+    """
     if depth > tree.MAX_MATERIALS:
         raise InputError(f"more than {tree.MAX_MATERIALS} nested materials", where, "mix fewer materials")
     located: Notation = {}

@@ -1,4 +1,4 @@
-"""MaterialX: open_pbr_surface and standard_surface, read with the wheel MaterialX (gonio[materialx])."""
+"""MaterialX: open_pbr_surface and standard_surface, read with the package MaterialX (gonio[materialx])."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import numpy as np
 from ...errors import InputError, MachineError, did_you_mean
 from . import Described, Document, Notation, xml_guard
 
-Node: TypeAlias = Any  # of MaterialX, in C++, without stubs
+Node: TypeAlias = Any  # a C++ object of MaterialX, which has no type stubs
 Number: TypeAlias = float | bool | tuple[float, ...]
 Inputs: TypeAlias = dict[str, Number]
 
@@ -31,7 +31,7 @@ FRAMES = {
     "normal",
 }
 
-# Inputs that `to_open_pbr` cannot express, with the values at which they have no effect
+# inputs that `to_open_pbr` cannot express, with the values for which they have no effect
 LEFT: Mapping[str, Number] = {
     "specular_rotation": 0.0, "transmission_extra_roughness": 0.0, "coat_rotation": 0.0, "coat_affect_color": 0.0,
 }  # fmt: skip
@@ -48,13 +48,13 @@ class MaterialX(Document):
         return list(_surfaces(_document(path)))
 
     def read(self, path: Path, name: str) -> Described:
-        document = _document(path)  # must be referenced here, since its nodes do not hold it
+        document = _document(path)  # must be referenced here, because its nodes do not keep it alive
         surface = _surfaces(document)[name]
         where = f"{path}#{surface.getName()}"
         given = _inputs(surface, where)
         notices: list[str] = []
         if surface.getCategory() == STANDARD:
-            definition = surface.getNodeDef()  # for its version
+            definition = surface.getNodeDef()  # contains the version
             inputs = {**_defaults(definition.getName() if definition else f"ND_{STANDARD}_surfaceshader"), **given}
             notices = [f"{key} is omitted" for key, without in LEFT.items() if inputs[key] != without]
             given = to_open_pbr(inputs)
@@ -62,13 +62,13 @@ class MaterialX(Document):
         return Described({"type": "openpbr", **values}, tuple(notices))
 
     def write(self, notation: Notation, name: str) -> bytes:
-        """The file of an `openpbr`: an open_pbr_surface and a material of that name."""
+        """The bytes of a file for an `openpbr`, with an open_pbr_surface and a material of the given name."""
         mx = _wheel()
         document = mx.createDocument()
         surface = document.addNode(OPEN_PBR, "surface_" + mx.createValidName(name), "surfaceshader")
         known = _types(OPEN_PBR)
         for key, value in notation.items():
-            if key in ("type", "layering"):  # how the lobes are combined is specific to Gonio
+            if key in ("type", "layering"):  # the combination of the lobes is specific to Gonio
                 continue
             if key not in known:
                 raise InputError(f"{OPEN_PBR} has no input '{key}'", "material", did_you_mean(key, list(known)))
@@ -82,9 +82,9 @@ class MaterialX(Document):
 def to_open_pbr(s: Mapping[str, Number]) -> Inputs:
     """The parameters of OpenPBR that correspond to those of Autodesk's Standard Surface.
 
-    The formulas are those of MaterialX's node graph NG_standard_surface_to_open_pbr_surface (MaterialX2024), in its
-    libraries/bxdf/translation. It converts a film's thickness to micrometers, lets a coat over metal only tint, and
-    maps `coat_affect_roughness` to `coat_darkening`.
+    The formulas are those of the node graph NG_standard_surface_to_open_pbr_surface in MaterialX (MaterialX2024,
+    libraries/bxdf/translation). It converts the thickness of a film to micrometers, reduces a coat over metal to a
+    tint, and maps `coat_affect_roughness` to `coat_darkening`.
     """
     coat, metal = _number(s["coat"]), _number(s["metalness"])
     colour, coat_colour = _colour(s["base_color"]), _colour(s["coat_color"])
@@ -153,7 +153,7 @@ def _wheel() -> ModuleType:
 
 @lru_cache(maxsize=1)
 def _library() -> Node:
-    """The definitions of nodes that a document may use."""
+    """The node definitions that a document may use."""
     mx = _wheel()
     library = mx.createDocument()
     for file in LIBRARIES:
@@ -163,7 +163,7 @@ def _library() -> Node:
 
 @lru_cache(maxsize=4)
 def _types(category: str) -> dict[str, str]:
-    """The type of each input of a surface that is a value."""
+    """The types of those inputs of a surface that are values."""
     inputs = _library().getNodeDef(f"ND_{category}_surfaceshader").getActiveInputs()
     return {one.getName(): one.getType() for one in inputs if one.getName() not in FRAMES}
 
@@ -174,7 +174,7 @@ def _defaults(definition: str) -> Inputs:
 
 
 def _plain(value: Node) -> Number:
-    """A value; a float32 as the shortest decimal number that rounds to it."""
+    """Convert a value of MaterialX; a float32 is converted to the shortest decimal number that rounds to it."""
     if isinstance(value, bool):
         return value
     if isinstance(value, int | float):
@@ -183,7 +183,7 @@ def _plain(value: Node) -> Number:
 
 
 def _document(path: Path) -> Node:
-    """A file as a MaterialX document, after checks: includes are resolved, entities rejected, sizes limited."""
+    """Read a file as a MaterialX document. Includes are resolved, entities are rejected, and sizes are limited."""
     mx = _wheel()
     root = xml_guard.read(path)
     if root.tag != "materialx":
@@ -192,13 +192,13 @@ def _document(path: Path) -> Node:
     try:
         mx.readFromXmlString(document, ElementTree.tostring(root, "unicode"))
         document.setDataLibrary(_library())
-    except Exception as error:  # MaterialX has its own exceptions
+    except Exception as error:  # MaterialX raises its own exceptions
         raise InputError(f"MaterialX rejects it: {str(error)[:200]}", str(path), "correct it there") from None
     return document
 
 
 def _surfaces(document: Node) -> dict[str, Node]:
-    """The surface of each material by the material's name, and surfaces without one by their own."""
+    """The surface of each material, by the name of the material, and other surfaces, by their own names."""
     surfaces: dict[str, Node] = {}
     loose = {node.getName(): node for node in document.getNodes() if node.getType() == "surfaceshader"}
     for material in document.getNodes():
@@ -211,7 +211,7 @@ def _surfaces(document: Node) -> dict[str, Node]:
 
 
 def _inputs(surface: Node, where: str) -> Inputs:
-    """The inputs that are set on a surface, each a value of the type in its definition."""
+    """The inputs that are set on a surface, as values of the types in its definition."""
     category = surface.getCategory()
     if category not in (OPEN_PBR, STANDARD):
         raise InputError(f"unknown node '{category[:60]}'", where, f"supported: {OPEN_PBR} and {STANDARD}")
@@ -244,7 +244,7 @@ def _value(one: Node, where: str) -> Number:
 
 
 def _text(value: object, kind: str, name: str) -> str:
-    """A value as MaterialX writes it."""
+    """Format a value as in a MaterialX file."""
     try:
         if kind == "boolean":
             if not isinstance(value, bool):

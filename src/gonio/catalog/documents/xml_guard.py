@@ -1,4 +1,4 @@
-"""Untrusted XML: sizes are checked before anything is built, and included files are resolved here."""
+"""Read untrusted XML: sizes are checked before objects are created, and included files are inserted."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ _INCLUDE = "{http://www.w3.org/2001/XInclude}include"
 
 
 def read(path: Path) -> ElementTree.Element:
-    """The root element of a file, with included files in place of the includes.
+    """Read a file and return its root element, in which includes are replaced by the included files.
 
-    Included files must be in the folder of the first. Raises InputError for a file that is not well-formed, declares
-    entities (which may grow without bounds), includes itself, or exceeds the limits of size, depth or number of parts.
+    Included files must be in the folder of the main file. Raises InputError for a file that is not well-formed,
+    declares entities (which may expand without bounds), includes itself, or exceeds the limits of size, depth or number
+    of elements.
     """
     folder = path.parent.resolve()
     left, files = MOST_ELEMENTS, 0
@@ -59,7 +60,7 @@ def _included(element: ElementTree.Element, file: Path, folder: Path, above: tup
 
 
 def _guarded(path: Path, most: int) -> tuple[ElementTree.Element, int]:
-    """The root of one file, and how many elements it has."""
+    """The root element of one file, and the number of its elements."""
     try:
         size = path.stat().st_size
         if size > MOST_BYTES:

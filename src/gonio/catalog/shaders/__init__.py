@@ -1,9 +1,9 @@
 """User shaders as materials: GLSL, HLSL, WGSL, SPIR-V and the .brdf files of Disney's BRDF Explorer.
 
-    my.glsl                 read by its adapter my.glsl.toml, or by names of functions and arguments (`adapter`)
+    my.glsl                 interpreted by its adapter my.glsl.toml, or by names of functions and arguments (`adapter`)
     disney.brdf             parameters and shader in one file (`explorer`)
 
-A shader cannot run native code: its instructions are executed by `gonio.spirv`. The readers are loaded on first use.
+A shader cannot run native code, because `gonio.spirv` executes its instructions. The readers are loaded on first use.
 """
 
 from importlib import import_module

@@ -1,16 +1,16 @@
-"""The meaning of a shader's functions and uniforms: a short TOML file beside the shader, FILE.toml, or guesses.
+"""The meanings of a shader's functions and uniforms, from a short TOML file beside the shader, FILE.toml, or guessed.
 
 function = "BRDF"                       # f, a color or a number
 arguments = ["light", "view", "normal"] # the meaning of each argument
 cosine = false                          # whether the function includes |cos theta_i|
-albedo = "sheenAlbedo"                  # a function of the view that states the integral of the BRDF
+albedo = "sheenAlbedo"                  # a function of the view that returns the integral of the BRDF
 lossless_tolerance = 0.02               # the largest intended loss in a white furnace
 
 [parameters.roughness]                  # a uniform, or an argument
 default = 0.5
 low = 0.0
 high = 1.0
-unit = "nm"                             # as plots and sliders print it
+unit = "nm"                             # the unit in plots and at sliders
 doc = "width of the lobe"
 
 [textures.table]
@@ -36,23 +36,23 @@ from ...spirv.images import FILTERS, WRAPS
 MEANINGS = {
     "light": "unit vector toward the light",
     "view": "unit vector toward the viewer",
-    "incident": "unit vector along the light's travel, -light",
-    "normal": "the surface's normal, (0, 0, 1)",
+    "incident": "unit vector in the direction in which the light travels, -light",
+    "normal": "surface normal, (0, 0, 1)",
     "tangent": "(1, 0, 0)",
     "bitangent": "(0, 1, 0)",
     "half": "unit vector between light and view",
-    "n.l": "cosine of light and normal",
-    "n.v": "cosine of view and normal",
-    "n.h": "cosine of half vector and normal",
-    "l.h": "cosine of light and half vector",
-    "l.v": "cosine of light and view",
-    "u": "three random numbers, of `sample`",
-    "derived": "what the function `derive` returns for the parameters",
-    "result": "where a function without a value writes it, as `out vec3 color`",
-    "ignored": "written by the function besides its value, and not read",
-    "parameter": "a parameter of the material; of a struct every member is one",
+    "n.l": "cosine between light and normal",
+    "n.v": "cosine between view and normal",
+    "n.h": "cosine between half vector and normal",
+    "l.h": "cosine between light and half vector",
+    "l.v": "cosine between light and view",
+    "u": "three random numbers, for `sample`",
+    "derived": "result of the function `derive` for the parameters",
+    "result": "argument to which a function without a return value writes its result, such as `out vec3 color`",
+    "ignored": "additional output of the function, which is not used",
+    "parameter": "a parameter of the material; for a struct, every member is a parameter",
 }
-# names of arguments, in lower case and without prefixes, by their meaning
+# names of arguments, in lower case and without prefixes, by meaning
 _GUESSES = {
     "light": ("l", "wi", "light", "lightdir", "lightdirection", "ldir", "tolight", "omegai", "dirl"),
     "view": ("v", "wo", "view", "viewdir", "viewdirection", "eye", "eyedir", "vdir", "toeye", "toview", "omegao"),
@@ -73,10 +73,10 @@ MAX_TOML = 1 << 18
 
 @dataclass(frozen=True)
 class Uniform:
-    """A parameter as the adapter describes it; entries that are missing are taken from the shader.
+    """The description of a parameter in the adapter. Missing entries are determined from the shader.
 
-    kind  for a vector of two components: "alpha", widths along x and y, or "angle", cosine and sine; "fixed" for a
-          parameter that keeps its default
+    kind  for a vector with two components: "alpha" for widths along x and y, or "angle" for cosine and sine; "fixed"
+          for a parameter that keeps its default
     """
 
     default: Any = None
@@ -89,19 +89,20 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Adapter:
-    """The meaning of a shader; see the docstring of this module.
+    """The meanings of the functions and uniforms of a shader, see the docstring of this module.
 
-    pdf, sample         names of functions, "" for none
-    pdf_arguments, sample_arguments  the meanings of their arguments
-    derive              name of a function of the parameters alone, whose result is the argument "derived" of others
+    pdf, sample         names of functions; "" for none
+    pdf_arguments, sample_arguments  meanings of the arguments of these functions
+    derive              name of a function that depends only on the parameters, and whose result is passed to other
+                        functions as the argument "derived"
     struct              type of the first argument, which distinguishes overloads; only for shaders from `gonio emit`
-    albedo              name of a function that states the albedo for the view, "" for none
-    albedo_tolerance    its intended error
-    lossless_tolerance  the intended loss in a white furnace; None for no claim
-    includes            folders, relative to the shader, from which it may include
+    albedo              name of a function that returns the albedo for the view direction; "" for none
+    albedo_tolerance    intended error of this function
+    lossless_tolerance  intended loss in a white furnace; None if the shader makes no claim
+    includes            folders, relative to the shader, from which it may include files
     defines             macros
-    where               file of the adapter, for errors
-    unset_is_zero       whether variables and inputs that are never set are 0; else a shader that reads one is refused
+    where               name of the adapter file in errors
+    unset_is_zero       whether variables and inputs that are never set are 0; otherwise, reading one is an error
     """
 
     function: str = ""
@@ -130,13 +131,13 @@ class Adapter:
 
 
 def meaning_of(name: str) -> str:
-    """The meaning of an argument by its name, "parameter" for any other name."""
+    """The meaning of an argument, from its name; "parameter" for unknown names."""
     plain = re.sub(r"^(?:in|a|p|u|f)_|_(?:ws|ts|dir|vec)$|_", "", name.lower())
     return _BY_NAME.get(name.lower(), _BY_NAME.get(plain, "parameter"))
 
 
 def read(path: Path) -> Adapter:
-    """The adapter in a TOML file. Raises InputError, with what is accepted, for unknown keys and wrong types."""
+    """Read an adapter from a TOML file. Raises InputError, which states what is accepted, for invalid entries."""
     try:
         if path.stat().st_size > MAX_TOML:
             raise InputError(f"larger than {MAX_TOML} bytes", str(path), "an adapter is a short file")
@@ -156,11 +157,11 @@ KINDS: dict[str, type] = {
 
 
 def parsed(content: Mapping[str, Any], where: str, over: Adapter | None = None) -> Adapter:
-    """The adapter given by the keys and values of a TOML file.
+    """The adapter from the keys and values of a TOML file.
 
-    where  the file, for errors
-    over   an adapter that supplies the entries missing from the content
-    Raises InputError, with what is accepted, for unknown keys and wrong types.
+    where  name of the file in errors
+    over   an adapter from which missing entries are copied
+    Raises InputError, which states what is accepted, for unknown keys and values of the wrong type.
     """
     over = Adapter() if over is None else over
     fields: dict[str, Any] = {"where": where}
@@ -178,7 +179,7 @@ def parsed(content: Mapping[str, Any], where: str, over: Adapter | None = None) 
 
 
 def with_options(adapter: Adapter, options: Sequence[tuple[str, str]]) -> Adapter:
-    """An adapter with some entries replaced by options of the command line: ("parameters.alpha.low", "0.1").
+    """An adapter in which entries are replaced by command-line options such as ("parameters.alpha.low", "0.1").
 
     Raises InputError as `parsed` does.
     """
@@ -199,7 +200,7 @@ OPTION = "--adapter"
 
 
 def _value(path: Sequence[str], text: str) -> object:
-    """The value of an option's text: a list with commas, a number, true, false, or the text."""
+    """Convert the text of an option to a value: a list if it contains commas, a number, true, false, or the text."""
     if KINDS.get(path[0]) is str or path[0] == "defines" or path[-1] in ("unit", "doc", "file"):
         return text
     if KINDS.get(path[0]) is list or "," in text:
@@ -218,7 +219,7 @@ def _scalar(text: str) -> object:
 
 
 def as_option(value: object) -> str:
-    """A value as a string that `with_options` accepts."""
+    """Convert a value to a string that `with_options` accepts."""
     if isinstance(value, bool):
         return str(value).lower()
     return ",".join(map(as_option, value)) if isinstance(value, list | tuple) else str(value)

@@ -1,4 +1,4 @@
-"""A first adapter for a shader, guessed from its names, and the list of these guesses."""
+"""Write a first adapter for a shader, guessed from the names in it, and list the guesses."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .program import Program
 
 
 class Adopted(NamedTuple):
-    """An adapter as TOML, and the guesses in it, one sentence each."""
+    """An adapter as TOML text, and the guesses in it, one sentence each."""
 
     text: str
     guesses: tuple[str, ...]
 
 
 def adopt(file: str | Path) -> Adopted:
-    """The adapter for a shader's name, which may contain options. Raises InputError if the shader cannot be read."""
+    """Guess the adapter for a shader, whose name may contain options. Raises InputError if it cannot be read."""
     name, query = parted(str(file))
     path = Path(os.path.expanduser(name))
     if not names_shader(str(path)):
@@ -79,7 +79,7 @@ def _toml(value: object, shape: str) -> str:
 
 
 def _number(value: object) -> str:
-    """A number with the digits of 32 bits: 0.8, not 0.800000011920929."""
+    """A number with the digits of its float32 value, such as 0.8 instead of 0.800000011920929."""
     number = float(str(value))
     short = float(str(np.float32(number)))
     return f"{short if np.float32(number) == np.float64(number) else number}"
@@ -89,16 +89,16 @@ def _guesses(program: Program, adapter: Adapter) -> list[str]:
     meanings = dict(zip(program.argument_names("eval"), adapter.arguments, strict=True))
     listed = ", ".join(f"{name} = {meaning}" for name, meaning in meanings.items())
     guesses = [
-        f"the BRDF is '{adapter.function}', by its name and arguments: {listed}",
-        f"the cosine is {'included' if adapter.cosine else 'not included'}, which the file does not say",
+        f"the BRDF is '{adapter.function}', because of its name and arguments: {listed}",
+        f"the cosine is {'included' if adapter.cosine else 'not included'}; the file does not state it",
     ]
     others = [name for name in candidates(program.module) if name != adapter.function]
     if others:
-        guesses.insert(1, f"as likely, and not taken: {', '.join(others)}; --adapter function=NAME takes another")
+        guesses.insert(1, f"other candidates: {', '.join(others)}; --adapter function=NAME selects one of them")
     for declared in program.parameters.values():
         if declared.uniform.default is None:
             low, high, default = bounds(declared)
             default = _toml(default, declared.shape)
-            guesses.append(f"{declared.name}: default {default}, range {low:g} to {high:g}, by its name")
-    guesses += [f"texture {name}: give its file" for name in program.samplers() if name not in adapter.textures]
+            guesses.append(f"{declared.name}: default {default}, range {low:g} to {high:g}, because of its name")
+    guesses += [f"texture {name}: add its file" for name in program.samplers() if name not in adapter.textures]
     return guesses

@@ -1,6 +1,6 @@
-"""The parameters of a shader: its uniforms and arguments, split into numbers, colors, flags and integers.
+"""The parameters of a shader: its uniforms and arguments, divided into numbers, colors, flags and integers.
 
-uniform mat3 M;        M_0, M_1, M_2      a color per column
+uniform mat3 M;        M_0, M_1, M_2      one color per column
 uniform vec4 c[2];     c_0, c_1           four numbers each, c_0_x and so on
 uniform ivec2 n;       n_x, n_y
 """
@@ -18,11 +18,11 @@ from .adapter import Uniform
 
 PLAIN = ("float", "bool", "int", "uint", "vec2", "vec3", "vec4")
 INTEGERS = ("int", "uint")
-MAX_NUMBERS = 64  # of a uniform that is split
+MAX_NUMBERS = 64  # maximum number of values in a uniform that is divided
 
 
 class Declared(NamedTuple):
-    """A parameter of a shader: its name, its shape ("float", "vec3", ...), and its entry in the adapter."""
+    """A parameter of a shader: its name, its shape ("float", "vec3", ...), and the entry in the adapter."""
 
     name: str
     shape: str
@@ -30,7 +30,7 @@ class Declared(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A part of a uniform or argument that is a parameter, and its value in the source, None if it has none."""
+    """A part of a uniform or argument that is a parameter, and its value in the source, or None."""
 
     name: str
     shape: str
@@ -38,7 +38,7 @@ class Piece(NamedTuple):
 
 
 def pieces(module: Module, name: str, type: int, default: Value = None) -> Iterator[Piece]:
-    """The parameters in a uniform or argument of a type; none for textures, and none for more than 64 numbers."""
+    """The parameters in a uniform or argument of a given type. Textures and more than 64 numbers have none."""
     kind, shape = module.type(type), module.shape(type)
     if shape in PLAIN:
         yield Piece(name, shape, default)
@@ -51,7 +51,10 @@ def pieces(module: Module, name: str, type: int, default: Value = None) -> Itera
 
 
 def assembled(module: Module, name: str, type: int, values: Mapping[str, Value], zero: bool) -> Value:
-    """The value of a uniform or argument from those of its parameters; other parts are undefined, or 0."""
+    """The value of a uniform or argument, from the values of its parameters.
+
+    zero  whether parts that are not parameters are 0; otherwise, they are undefined
+    """
     kind, shape = module.type(type), module.shape(type)
     if shape in PLAIN and name in values:
         return values[name]
@@ -64,7 +67,7 @@ def assembled(module: Module, name: str, type: int, values: Mapping[str, Value],
 
 
 def _parts(module: Module, name: str, type: int) -> list[tuple[str, int]]:
-    """Names and types of the parts of a composite."""
+    """The names and types of the parts of a composite."""
     kind = module.type(type)
     if kind.kind == "struct":
         return [(f"{name}_{module.members.get((type, at), at)}", part) for at, part in enumerate(kind.parts)]
@@ -76,6 +79,6 @@ def _parts(module: Module, name: str, type: int) -> list[tuple[str, int]]:
 
 
 def integer(default: Any, doc: str, low: float, high: float) -> Any:
-    """The field of an integer, which shapes the code."""
+    """Declare an integer parameter, whose value affects the generated code."""
     metadata = {"kind": IntegerParameter, "doc": doc, "low": low, "high": high}
     return dataclasses.field(default=f"{default:g}", metadata=metadata)

@@ -1,4 +1,4 @@
-"""Shaders written by `gonio emit`: the manifest.json beside one replaces an adapter."""
+"""Shaders written by `gonio emit`, for which the manifest.json beside the shader replaces an adapter."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 from ...errors import InputError
 
-MAX_MANIFEST = 16 << 20  # bytes; that of a module with all materials has 1 MB
-_KINDS = {"alpha": "alpha", "angle": "angle"}  # kinds of parameters whose fields are vectors of another meaning
+MAX_MANIFEST = 16 << 20  # maximum size in bytes; that of a module with all materials has 1 MB
+_KINDS = {"alpha": "alpha", "angle": "angle"}  # kinds of parameters whose fields are vectors with another meaning
 
 
 def manifest_of(shader: Path) -> Path | None:
-    """The manifest that names a shader as its own; None if there is none."""
+    """The manifest of a shader; None if there is none."""
     file = shader.parent / "manifest.json"
     try:
         if not file.is_file() or file.stat().st_size > MAX_MANIFEST:
@@ -22,15 +22,15 @@ def manifest_of(shader: Path) -> Path | None:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return None
-    if f'"{shader.name}"' not in text:  # other programs also write files of that name
+    if f'"{shader.name}"' not in text:  # other programs also write files with this name
         return None
     return file if _loaded(file).get("shader") == shader.name else None
 
 
 def content(file: Path, function: str = "") -> dict[str, Any]:
-    """The content of an adapter for a shader, from its manifest; empty if the function is not a material's `eval`.
+    """The content of an adapter for a shader, from its manifest; empty if the function is not the `eval` of a material.
 
-    Raises InputError for a module of several materials if no function is named, and for a damaged manifest.
+    Raises InputError if the module contains several materials and no function is named, and for a damaged manifest.
     """
     manifest = _loaded(file)
     try:
@@ -74,7 +74,7 @@ def _entries(manifest: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _parameter(field: Mapping[str, Any], described: Mapping[str, Any]) -> dict[str, Any]:
-    """The entry of a field of the struct; a field on which tables depend keeps its value."""
+    """The adapter's entry for a field of the struct. A field on which tables depend keeps its value."""
     kind = "fixed" if described["fixed"] else _KINDS.get(described["kind"], "")
     result = {"default": field["value"] if kind == "fixed" else described["value"], "doc": described["doc"]}
     result |= {key: described[key] for key in ("low", "high") if described[key] is not None and kind != "fixed"}

@@ -1,4 +1,4 @@
-"""The .brdf files of Disney's BRDF Explorer: parameters and a function `BRDF` in GLSL, f without the cosine.
+"""The .brdf files of Disney's BRDF Explorer: parameters, and a function `BRDF` in GLSL, which returns f without cosine.
 
 analytic
 ::begin parameters
@@ -23,16 +23,16 @@ _TYPES = {"float": "float", "color": "vec3", "bool": "bool"}
 
 
 def is_explorer(text: str) -> bool:
-    """Whether the text of a .brdf is one of the BRDF Explorer's shaders, not a table, by its first word."""
+    """Whether the text of a .brdf file is a shader of the BRDF Explorer instead of a table, from its first word."""
     words = re.sub(r"#.*", "", text[: 1 << 16]).split(maxsplit=1)
     return bool(words) and words[0] == "analytic"
 
 
 def read(text: str, where: str) -> tuple[str, Adapter]:
-    """The GLSL, at the same lines as in the file, and the adapter.
+    """The GLSL, with the same line numbers as in the file, and the adapter.
 
-    text   the content of the .brdf file
-    where  the file, for errors
+    text   content of the .brdf file
+    where  name of the file in errors
     Raises InputError, with file and line, if the file is damaged.
     """
     section, lines, parameters = "", [], {}

@@ -1,4 +1,4 @@
-"""Shader files as material classes, created once per saved version of the shader and of all files that it includes.
+"""Shader files as material classes, which are created once per saved version of the shader and its included files.
 
 cls = class_of("my.glsl")      # a class with the shader's parameters
 Shader("my.glsl", roughness=0.3)
@@ -30,9 +30,9 @@ from .names import options_in, parted, with_options
 from .program import Program
 
 _LANGUAGES = {".hlsl": "hlsl", ".slang": "slang", ".wgsl": "wgsl"}  # others are GLSL
-MAX_FILE = 4 << 20  # bytes of a shader
-MAX_CLASSES = 64  # in memory
-# names of parameters that are taken to lie in [0, 1]
+MAX_FILE = 4 << 20  # maximum size of a shader in bytes
+MAX_CLASSES = 64  # maximum number of classes in memory
+# names of parameters that are assumed to be in [0, 1]
 _UNIT = re.compile(r"rough|metal|albedo|colou?r|specular$|sheen|coat|tint|subsurface|reflectan|^k[ds]$|f0", re.I)
 
 
@@ -48,11 +48,12 @@ def Shader(
         go.Shader("my.glsl", roughness=0.3)
         go.Shader("my.glsl", defines={"USE_SHEEN": 1}, adapter={"function": "evalSheen", "textures": {"lut": "e.npy"}})
 
-    file        the shader; FILE.toml beside it is its adapter, see docs/shaders.md
-    defines     macros of GLSL, HLSL and Slang, overrides of WGSL, by name; added to those of the adapter
-    adapter     entries as in FILE.toml, which override those there
+    file        the shader, whose adapter is FILE.toml beside it, see docs/shaders.md
+    defines     macros of GLSL, HLSL and Slang, or overrides of WGSL, by name, in addition to those of the adapter
+    adapter     entries of the adapter, which override those in FILE.toml
     parameters  values of the shader's parameters
-    Raises InputError, with file and line, for a shader that cannot be read; MachineError without a compiler.
+    Raises InputError, with file and line, for a shader that cannot be read, and MachineError if there is no shader
+    compiler.
     """
     macros = [(f"defines.{key}", value) for key, value in (defines or {}).items()]
     options = [(key, adapters.as_option(value)) for key, value in (*_flat(adapter or {}), *macros)]
@@ -67,7 +68,7 @@ def Shader(
 
 
 def _flat(content: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
-    """The values of nested dicts by path: "textures.lut.file"."""
+    """The values in nested dictionaries by path, such as "textures.lut.file"."""
     for key, value in content.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{key}.")
@@ -80,15 +81,15 @@ _classes: dict[tuple[str, str, str], tuple[_Stamp, type[BSDF]]] = {}
 
 
 def files_read(shader: Path) -> frozenset[Path]:
-    """The files of a shader's last use: the shader, its adapter, includes and textures. Empty if it was never used."""
+    """The files read at the last use of a shader (shader, adapter, includes, textures); empty if it was never used."""
     stamps = [stamp for (path, _, _), (stamp, _) in _classes.items() if Path(path) == shader.absolute()]
     return frozenset(Path(name) for stamp in stamps for name, _, _ in stamp)
 
 
 def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
-    """The class for a shader's name, which may contain options: "my.glsl", "my.glsl?function=f".
+    """The class for the name of a shader, which may contain options, such as "my.glsl" or "my.glsl?function=f".
 
-    inside  the folder that must contain the files named by the adapter; None for any folder
+    inside  the folder that must contain the files named by the adapter; None allows any folder
     """
     file, query = parted(text)
     path = Path(os.path.expanduser(file)).absolute()
@@ -115,7 +116,7 @@ def class_of(text: str, inside: Path | None = None) -> type[BSDF]:
 
 
 def adapter_of(path: Path) -> Path | None:
-    """The file that states how a shader is read: the adapter beside it, or the manifest from `gonio emit`."""
+    """The file that describes a shader: the adapter beside it, or the manifest from `gonio emit`."""
     named = Path(f"{path}.toml"), path.with_suffix(".toml")
     return next((one for one in named if one.is_file()), None) or emitted.manifest_of(path)
 
@@ -135,10 +136,11 @@ def _is_current(stamp: _Stamp) -> bool:
 def read(
     path: Path, adapter_file: Path | None, inside: Path | None = None, options: Sequence[tuple[str, str]] = ()
 ) -> Program:
-    """The program of a file.
+    """Read a shader and its adapter.
 
-    adapter_file  from `adapter_of`; if None, meanings are guessed from names
-    options       entries that override the adapter's, by key
+    adapter_file  the result of `adapter_of`; if it is None, meanings are guessed from names
+    inside        as in `class_of`
+    options       entries that override those of the adapter, as pairs (key, value)
     """
     where = path.name
     if not path.is_file():
@@ -167,13 +169,13 @@ def read(
 
 
 def _adapter(described: Adapter, file: Path | None, options: Sequence[tuple[str, str]]) -> Adapter:
-    """The adapter in a file, else that from the shader's own text, with entries overridden by options."""
+    """The adapter in a file, or else the one in the text of the shader, with entries overridden by options."""
     function = dict(options).get("function", "")
     if file is not None and file.suffix == ".json":
         described = adapters.parsed(emitted.content(file, function), str(file))
     elif file is not None:
         described = adapters.read(file)
-    if function and function != described.function:  # the adapter's entries on another function do not apply
+    if function and function != described.function:  # the adapter's entries are for another function and do not apply
         described = replace(described, arguments=(), cosine=None, pdf="", sample="", derive="", struct="")
     return adapters.with_options(described, options)
 
@@ -181,10 +183,10 @@ def _adapter(described: Adapter, file: Path | None, options: Sequence[tuple[str,
 def _compiled(
     text: str, where: str, language: str, defines: Mapping[str, str], folders: list[Path], files: list[Path]
 ) -> Module:
-    """The module compiled from a shader's text.
+    """Compile the text of a shader to a module.
 
-    folders  the shader's own folder, in which #include <FILE> does not look, and then the named ones
-    files    receives the files that the text includes
+    folders  the folder of the shader, which is not searched for #include <FILE>, and then the folders in the adapter
+    files    a list to which the included files are appended
     """
     if language == "wgsl":
         return translated(text, where, defines, folders, files)
@@ -194,15 +196,14 @@ def _compiled(
 
 
 def _folder(path: Path, inside: Path | None, where: str) -> Path:
-    """The resolved path of a folder of `includes`. Raises InputError, which names the adapter `where`, if there is
-    none."""
+    """The resolved path of a folder in `includes`. Raises InputError with the adapter `where` if it is missing."""
     if not _confined(path, inside).is_dir():
         raise InputError(f"includes: there is no folder '{path}'", where, "give folders relative to the shader")
     return path.resolve()
 
 
 def _confined(path: Path, inside: Path | None) -> Path:
-    """The resolved path of a file or folder that an adapter names. Raises InputError if it is outside `inside`."""
+    """The resolved path of a file or folder named by an adapter. Raises InputError if it is outside `inside`."""
     resolved = path.resolve()
     if inside is not None and not resolved.is_relative_to(inside.resolve()):
         raise InputError(f"'{path.name}' lies outside the scene's folder {inside}", str(path), "copy it there")
@@ -213,7 +214,7 @@ def _confined(path: Path, inside: Path | None) -> Path:
 
 
 class _ShaderType(type):
-    """The metaclass of classes created from files, which are pickled as the file's name."""
+    """The metaclass of classes created from files, which are pickled by the name of the file."""
 
 
 def _pickled(cls: _ShaderType) -> object:
@@ -225,11 +226,11 @@ copyreg.pickle(_ShaderType, _pickled)  # type: ignore[arg-type]
 
 
 class _Shader(_ShaderFile, metaclass=_ShaderType):
-    """Base of classes without their own density."""
+    """The base of classes for shaders without their own density."""
 
 
 class _SampledShader(_SampledShaderFile, metaclass=_ShaderType):
-    """Base of classes with their own density."""
+    """The base of classes for shaders with their own density."""
 
 
 def _made(path: Path, spelling: str, program: Program, inside: Path | None) -> type[BSDF]:
@@ -260,7 +261,7 @@ def _made(path: Path, spelling: str, program: Program, inside: Path | None) -> t
 
 
 def _probe(material: BSDF) -> None:
-    """Raise InputError, with file and line, for unsupported constructs, before a law or a render fails on them."""
+    """Raise InputError, with file and line, for unsupported constructs, before they cause an error in a render."""
     for formula in ("eval", "pdf", "sample") if not type(material).guided else ("eval",):
         material.record(formula)
     material.stated_albedo(np.array([[0.0, 0.0, 1.0]]))
@@ -271,7 +272,7 @@ _RESERVED = {*dir(_SampledShaderFile), *keyword.kwlist, *_SCENES, "program"}
 
 
 def bounds(declared: Declared) -> tuple[float, float, Any]:
-    """Range and default of a parameter; guessed from its name if the adapter does not state them."""
+    """The range and default of a parameter, which are guessed from its name if the adapter does not state them."""
     uniform = declared.uniform
     named = declared.shape not in INTEGERS and _UNIT.search(declared.name)
     any_number = 0.0 if declared.shape == "uint" else -np.inf, np.inf
@@ -283,7 +284,7 @@ def bounds(declared: Declared) -> tuple[float, float, Any]:
 
 
 def _fields(declared: Declared) -> list[tuple[str, Any]]:
-    """The fields of a parameter: one, or one per component for a vector that is not a color."""
+    """The fields for a parameter: a single one, or one per component of a vector that is not a color."""
     name = declared.name.lstrip("_")
     name = f"{name}_" if name in _RESERVED else name
     uniform = declared.uniform
@@ -317,5 +318,5 @@ def _fields(declared: Declared) -> list[tuple[str, Any]]:
 
 
 def forget() -> None:
-    """Read all files again on their next use."""
+    """Clear the cache, so that all files are read again when they are next used."""
     _classes.clear()

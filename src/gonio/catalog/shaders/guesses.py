@@ -1,4 +1,4 @@
-"""Guesses, from names and types, of what a shader does not state: its BRDF, and the meaning of its arguments."""
+"""Guess what a shader does not state, its BRDF function and the meanings of arguments, from names and types."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def title(module: Module, function: Function) -> str:
 
 
 def one_of(module: Module, adapter: Adapter, key: str, where: str) -> Function:
-    """The function that an entry of the adapter names; `where` is the shader."""
+    """The function named by an entry of the adapter; `where` is the shader, for errors."""
     name = getattr(adapter, key)
     functions = module.function(name)
     where = f"{adapter.where}: {key}" if adapter.where and name else where
@@ -34,12 +34,12 @@ def one_of(module: Module, adapter: Adapter, key: str, where: str) -> Function:
 
 
 def of_struct(module: Module, name: str, struct: str) -> list[Function]:
-    """The functions of a name whose first parameter is a struct of name `struct`; a mix of mixes has overloads."""
+    """The functions with a given name whose first parameter is the struct `struct`; nested mixes have overloads."""
     return [one for one in module.function(name) if _first(module, one) == struct]
 
 
 def _first(module: Module, function: Function) -> str:
-    """The name of the type of a function's first parameter if it is a struct, else ""."""
+    """The name of the struct that is the type of a function's first parameter; "" for other types."""
     type_ = function.parameters[0][1] if function.parameters else 0
     if type_ and module.type(type_).kind == "pointer":
         type_ = module.type(type_).parts[0]
@@ -47,9 +47,9 @@ def _first(module: Module, function: Function) -> str:
 
 
 def _meanings(module: Module, function: Function, derived: bool = False) -> tuple[str, ...]:
-    """The meaning of each argument from its name, or from its type if the name is unknown.
+    """The meaning of each argument, from its name, or from its type if the name is unknown.
 
-    derived  whether an argument of this name is the result of the adapter's function `derive`
+    derived  whether an argument with the name "derived" is the result of the adapter's function `derive`
     """
     result = []
     written = _written(module, function)
@@ -68,7 +68,7 @@ def _meanings(module: Module, function: Function, derived: bool = False) -> tupl
 
 
 def _written(module: Module, function: Function) -> list[int]:
-    """The parameters that a function writes before it reads them, such as `out` ones: colors, then numbers."""
+    """The parameters that a function writes before it reads them, such as `out` parameters; colors come first."""
     first: dict[int, bool] = {id: False for id, type in function.parameters if module.type(type).kind == "pointer"}
     pending, owner = set(first), {id: id for id in first}
     for block in function.blocks.values():
@@ -85,7 +85,7 @@ def _written(module: Module, function: Function) -> list[int]:
 
 
 def _rank(module: Module, function: Function) -> tuple[int, int]:
-    """How likely a function is to be a BRDF, by its name and by the directions among its arguments."""
+    """A rank that states how likely a function is to be the BRDF, from its name and the directions in its arguments."""
     name = title(module, function).lower()
     exact = {"brdf": 6, "bsdf": 6, "evalbrdf": 5, "evaluatebrdf": 5, "brdf_eval": 5, "evalbsdf": 5, "eval": 4}
     near = 4 if name.endswith("_eval") else 3 if "brdf" in name or "bsdf" in name else 0
@@ -97,7 +97,7 @@ def _rank(module: Module, function: Function) -> tuple[int, int]:
 
 
 def candidates(module: Module) -> list[str]:
-    """The names of the equally best candidates for the BRDF; those that are not called by the others come first."""
+    """The names of the best candidates for the BRDF, which have equal rank; those not called by others come first."""
     own = [one for one in module.functions.values() if not title(module, one).startswith(("main", "gonio_"))]
     best = max((_rank(module, one) for one in own), default=(0, 0))
     equal = [one for one in own if best[0] > 0 and _rank(module, one) == best]
@@ -106,19 +106,19 @@ def candidates(module: Module) -> list[str]:
 
 
 def _calls(function: Function) -> Iterator[int]:
-    """The functions that a function calls."""
+    """The functions called by a function."""
     for block in function.blocks.values():
         yield from (one.operands[0] for one in block.instructions if one.name == "FunctionCall")
 
 
 def completed(module: Module, adapter: Adapter, where: str) -> Adapter:
-    """The adapter with guesses for its missing entries; `where` is the shader, for errors."""
+    """The adapter, completed with guesses for its missing entries; `where` is the shader, for errors."""
     guessed = not adapter.function
     name = adapter.function or next(iter(candidates(module)), "")
     adapter = replace(adapter, function=name)
     chosen = one_of(module, replace(adapter, where="") if guessed else adapter, "function", where)
     stem = name.removesuffix("_eval")
-    written = name != stem  # Gonio's own form: NAME_eval, NAME_pdf and NAME_sample, the cosine included
+    written = name != stem  # emitted by Gonio: NAME_eval, NAME_pdf and NAME_sample, with the cosine
     pdf, sample, derive = adapter.pdf, adapter.sample, adapter.derive
     if written and guessed:
         if module.function(f"{stem}_pdf") and module.function(f"{stem}_sample"):

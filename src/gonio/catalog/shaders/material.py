@@ -1,4 +1,4 @@
-"""A shader as a material: eval, and pdf and sample if the shader has both."""
+"""A shader as a material, with the shader's eval, and with its pdf and sample if it has both."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from .declared import INTEGERS
 if TYPE_CHECKING:
     from .program import Program
 
-ROTATIONS = 64  # directions at which isotropy is tested
+ROTATIONS = 64  # number of directions at which isotropy is tested
 _SIZES = {"spectrum": (3,), "alpha": (2,)}  # shapes of parameters that are vectors
-ISOTROPIC = 1e-9  # relative change by a rotation, in 64 bits
+ISOTROPIC = 1e-9  # largest relative change under rotation of an isotropic shader, in double precision
 
 
 class _ShaderFile(BSDF):
-    """A shader's BRDF, sampled by a guide.
+    """The BRDF of a shader, sampled with a guide.
 
-    program  the shader, with the meaning of its functions
-    inside   the folder that must contain its files; None for any
-    fields   parameter of the shader -> the fields that hold it, one per component of vectors that are not colors
+    program  the shader, with the meanings of its functions
+    inside   the folder that must contain the files of the shader; None allows any folder
+    fields   fields of each parameter, one per component of vectors that are not colors
     """
 
     program: ClassVar[Program]
     inside: ClassVar[Path | None] = None
     fields: ClassVar[dict[str, tuple[str, ...]]] = {}
     only_rgb: ClassVar[bool] = True
-    fits_factors: ClassVar[bool] = True  # a uniform may mean anything: clearcoatGloss is 1 by default, but not a factor
+    fits_factors: ClassVar[bool] = True  # a default of 1 need not be a scale factor: clearcoatGloss
 
     @property
     def transmits(self) -> bool:
@@ -46,7 +46,7 @@ class _ShaderFile(BSDF):
 
     @property
     def isotropic(self) -> bool:
-        """Whether rotations about the normal change no values, as tested at some directions."""
+        """Whether values are invariant under rotations about the normal, which is tested at some directions."""
         plain = self.plain
         cached = vars(plain).get("_isotropic")
         if cached is None:
@@ -60,7 +60,7 @@ class _ShaderFile(BSDF):
             given = [getattr(self, field) for field in self.fields.get(name, ())]
             if declared.uniform.kind == "fixed":
                 values[name] = declared.uniform.default
-            elif declared.uniform.kind == "angle":  # none if it is the plain number 0
+            elif declared.uniform.kind == "angle":  # no rotation if it is the number 0
                 values[name] = (1.0, 0.0) if given[0] is None else (given[0].x, given[0].y)
             elif declared.uniform.kind == "alpha":
                 values[name] = given[0].x, given[0].y
@@ -77,14 +77,14 @@ class _ShaderFile(BSDF):
         return self.program.run(formula, self._values(), directions)
 
     def _above(self, wo: Direction, wi: Direction) -> Value:
-        if self.program.adapter.struct:  # a shader written by Gonio states itself where it is 0
+        if self.program.adapter.struct:  # a shader written by Gonio is 0 where it should be
             return True
         if self.program.adapter.transmits:
             return (wo.z != 0.0) & (wi.z != 0.0)
         return (wo.z > 0.0) & (wi.z > 0.0)
 
     def stated_albedo(self, wo: NDArray[np.float64]) -> StatedAlbedo | None:
-        """The values of the adapter's function `albedo`."""
+        """The albedo that the shader's own function returns, if the adapter names one."""
         adapter = self.program.adapter
         if not adapter.albedo:
             return None
@@ -96,33 +96,33 @@ class _ShaderFile(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The value of the shader's function, times |cos theta_i| unless it includes that."""
+        """The value of the shader's function, multiplied by |cos theta_i| unless the function includes this factor."""
         factor = 1.0 if self.program.adapter.cosine else ops.abs(wi.z)
         above = self._above(wo, wi)
         color = self.program.color(self._run("eval", wo, light=wi))
         channels = [where(above, channel * factor, 0.0) for channel in color]
-        return ops.vec3(*channels)  # type: ignore[return-value]  # three numbers in every variant
+        return ops.vec3(*channels)  # type: ignore[return-value]  # three numbers in all variants
 
 
 class _SampledShaderFile(_ShaderFile):
-    """A shader with its own pdf and sample."""
+    """The BRDF of a shader with its own pdf and sample functions."""
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The shader's density."""
+        """The density that the shader's pdf function returns."""
         density = numeric(leaves(self._run("pdf", wo, light=wi))[0])
         return where(self._above(wo, wi), density, 0.0)  # type: ignore[no-any-return]
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """The shader's direction; its weight is the shader's own if it returns one, else eval / pdf."""
+        """The direction that the shader's sample function returns. The weight is the shader's, or else eval / pdf."""
         drawn = self._run("sample", wo, u=u)
         members = dict(zip(self.program.members("sample"), drawn, strict=False))
         direction = next((members[name] for name in ("wi", "direction", "L", "l", "dir") if name in members), drawn)
         wi: Value = ops.vec3(*[numeric(part) for part in leaves(direction)[:3]])
         if "weight" not in members or "pdf" not in members:
             return self._weighted(wi=wi, wo=wo, mode=mode)
-        above = self._above(wo, wi)  # as in eval and pdf: a direction below is a failed sample
+        above = self._above(wo, wi)  # as in eval and pdf, a direction below the surface is a failed sample
         weight: Value = ops.vec3(*[where(above, numeric(part), 0.0) for part in leaves(members["weight"])])
         made = Sample.of_density(wi, weight, where(above, numeric(members["pdf"]), 0.0))
         delta, eta = truth(members.get("delta", False)), numeric(members.get("eta", 1.0))

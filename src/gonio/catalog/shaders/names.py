@@ -1,8 +1,8 @@
-"""Strings that name shaders, and the options in them. Every material's string is tested, so no reader must be loaded.
+"""Strings that name shaders, and the options in these strings.
 
-After a question mark, such a string may add entries to the shader's adapter, as in a URL:
-"my.glsl?function=f&defines.N=1". They are part of the shader's name, so that they reach worker processes, scenes and
-results.
+After a question mark, the string may add entries to the adapter of the shader, as in a URL:
+"my.glsl?function=f&defines.N=1". Options are part of the shader's name, so they are passed on to worker processes,
+scenes and results. The string of every material is tested by this module, so it must not load the readers.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ _WITH_OPTIONS = re.compile(
 
 
 def parted(text: str) -> tuple[str, str]:
-    """The file and the options of a shader's name: ("my.glsl", "function=f"); "" for no options."""
+    """Split the name of a shader into file and options, such as ("my.glsl", "function=f"); "" for no options."""
     match = _WITH_OPTIONS.fullmatch(text.strip())
     return (match[1], match[2]) if match else (text.strip(), "")
 
 
 def options_in(query: str) -> list[tuple[str, str]]:
-    """The keys and values of "function=f&defines.N=1"."""
+    """The keys and values in options such as "function=f&defines.N=1"."""
     return parse_qsl(query, keep_blank_values=True, max_num_fields=1000)
 
 
 def with_options(text: str, options: Iterable[tuple[str, str]]) -> str:
-    """A shader's name with options added to its own, each replacing an earlier one of the same key."""
+    """The name of a shader with additional options, which replace its own options with the same keys."""
     file, query = parted(text)
     every = {**dict(options_in(query)), **dict(options)}
     query = "&".join(f"{quote(key, _PLAIN)}={quote(value, _PLAIN)}" for key, value in every.items())
@@ -42,7 +42,7 @@ def with_options(text: str, options: Iterable[tuple[str, str]]) -> str:
 
 
 def option(text: str, name: str, prefix: str = "") -> tuple[str, str]:
-    """(key, value) of "KEY=VALUE", given for the command-line option `name`; a macro may have no value."""
+    """Split "KEY=VALUE", given for the command-line option `name`, into key and value; a macro may have no value."""
     key, equals, value = text.partition("=")
     if not key.strip() or not (equals or prefix):
         example = "-D USE_SHEEN=1" if prefix else "--adapter function=BRDF"
@@ -51,19 +51,25 @@ def option(text: str, name: str, prefix: str = "") -> tuple[str, str]:
 
 
 def head_in(text: str) -> str:
-    """The shader's name, with its options, in a material's string: "my.glsl" in "my.glsl(roughness=0.3)"; else ""."""
+    """The name of the shader, with options, in the string of a material, such as "my.glsl" in "my.glsl(roughness=0.3)".
+
+    The result is "" if the string names no shader.
+    """
     head = text.partition("(")[0]
     return next((one.strip() for one in (text, head) if names_shader(one)), "")
 
 
 def file_in(text: str) -> Path | None:
-    """The shader file that a material's string names, with or without settings and options; None if it names none."""
+    """The shader file named by the string of a material, which may contain settings and options; None if there is none."""
     head = head_in(text)
     return Path(os.path.expanduser(parted(head)[0])) if head else None
 
 
 def names_shader(text: str) -> bool:
-    """Whether a string names a shader, by its suffix; a .brdf also by its first word, since tables have that suffix."""
+    """Whether a string names a shader, judging by the suffix.
+
+    For a .brdf file, the first word in the file is checked too, because tables have the same suffix.
+    """
     file = parted(text)[0]
     suffix = Path(file).suffix.lower()
     if suffix not in SUFFIXES or "\0" in text:

@@ -1,4 +1,4 @@
-"""A shader with its adapter: its parameters, and its functions on the values of a material."""
+"""A shader with its adapter: its parameters, and its functions, which are evaluated for the values of a material."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from .adapter import Adapter, Uniform, check_range
 from .declared import PLAIN, Declared, Piece, assembled, pieces
 from .guesses import completed, one_of, title
 
-# meanings whose arguments are vectors, or single numbers; types that are no directions
+# meanings whose arguments are vectors; meanings whose arguments are numbers; types that cannot be directions
 VECTORS = ("light", "view", "incident", "normal", "tangent", "bitangent", "half", "u")
 COSINES = ("n.l", "n.v", "n.h", "l.h", "l.v")
 NUMBERS = ("float", "int", "uint", "bool")
 
 
 class Program:
-    """A module with the meanings of its functions. Raises InputError if the meanings do not fit the functions."""
+    """A module with the meanings of its functions. Raises InputError if the meanings do not match the functions."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class Program:
         self.parameters = {name: declared[name] for name in (*self.adapter.parameters, *declared) if name in declared}
 
     def _check_types(self, formula: str, function: Function, meanings: Sequence[str], where: str) -> None:
-        """Raise InputError if a direction is given for a number, or a number for a direction."""
+        """Raise InputError if the meaning of a number is a direction, or the meaning of a vector is a number."""
         for (_, type), meaning in zip(function.parameters, meanings, strict=True):
             shape = self.module.shape(type)
             expected = "a vector" if meaning in VECTORS else "float" if meaning in COSINES else ""
@@ -87,7 +87,7 @@ class Program:
             if name in names:
                 continue
             names.add(name)
-            if not name.lstrip("_").isidentifier():  # it becomes a Python name; a name in SPIR-V may be any text
+            if not name.lstrip("_").isidentifier():  # the name must be valid in Python; in SPIR-V, it may be any text
                 hint = "use letters, digits and _, a letter first; compile SPIR-V with names"
                 raise InputError(f"{name[:40]!r} cannot be the name of a parameter", self.where, hint)
             uniform = self._stated(name) or Uniform()
@@ -102,12 +102,12 @@ class Program:
             raise InputError(f"no uniform '{unknown[0]}' in {self.where}", stated, f"it has: {known}")
 
     def _stated(self, name: str) -> Uniform | None:
-        """The adapter's entry for a parameter, under its name in the shader or in the material, `isotropic_`."""
+        """The adapter's entry for a parameter, by its name in the shader or in the material, such as `isotropic_`."""
         stated = self.adapter.parameters
         return stated.get(name, stated.get(f"{name}_"))
 
     def _uniforms(self) -> Iterator[Piece]:
-        """The parameters in uniforms; in matrices, arrays and structs only those that a function reads."""
+        """The parameters in uniforms. Of matrices, arrays and structs, only parts that a function reads are used."""
         module = self.module
         starts = [*(function.id for function, _ in self.formulas.values()), *(one.id for one in self._entries)]
         used = read(module, blocks_of(module, starts))
@@ -118,7 +118,7 @@ class Program:
 
     @functools.cached_property
     def _globals(self) -> list[tuple[str, int, Part]]:
-        """Name, type and place of uniforms, and of members of their blocks."""
+        """The name, type and location of each uniform and of each member of a uniform block."""
         module, result = self.module, list[tuple[str, int, Part]]()
         for id, one in module.variables.items():
             inside = module.type(one.type).parts[0]
@@ -134,10 +134,13 @@ class Program:
 
     @functools.cached_property
     def _entries(self) -> list[Function]:
-        """The functions that assign globals before a formula is called: those that the compiler requires, which contain
-        the initial values, and the text's own `main` if a formula reads what it assigns."""
+        """The functions that assign global variables before a formula is called.
+
+        These are the entry points that the compiler requires, which contain the initial values, and the shader's own
+        `main` if a formula reads variables that it assigns.
+        """
         module, formulas = self.module, [function.id for function, _ in self.formulas.values()]
-        ours = module.function("gonio_entry")  # in HLSL
+        ours = module.function("gonio_entry")  # exists in HLSL
         mains = module.function("main" if ours else "gonio_main")
         reached = {id for id, _ in read(module, blocks_of(module, formulas))}
         calls = {*formulas, *called(blocks_of(module, formulas))}
@@ -150,14 +153,17 @@ class Program:
 
     @functools.cached_property
     def _examples(self) -> list[int]:
-        """The functions at which the compiler's entry point ends, since from there it only calls every function to
-        prevent their removal: in HLSL one function that does so, in Slang all."""
+        """The functions at which the execution of the compiler's entry point ends.
+
+        From there on, it only calls all functions, to prevent their removal: in HLSL through one function, in Slang
+        directly.
+        """
         module = self.module
         of_slang = any(module.names.get(id, "").startswith("gonio_") for id in module.variables)
         return list(module.functions) if of_slang else [one.id for one in module.function("@gonio_entry")]
 
     def _arguments(self) -> Iterator[Piece]:
-        """The functions' arguments that are parameters, and the members of structs among them."""
+        """The arguments of functions that are parameters, and the members of those that are structs."""
         for function, meanings in self.formulas.values():
             for (id, type), meaning in zip(function.parameters, meanings, strict=True):
                 if meaning == "parameter":
@@ -177,9 +183,9 @@ class Program:
     # ------------------------------------------------------------------ running
 
     def run(self, formula: str, values: dict[str, Value], directions: dict[str, Value]) -> Value:
-        """A formula's result, as tuples of scalars.
+        """Evaluate a formula. The result consists of tuples of scalars.
 
-        values      value of each parameter by name: a scalar, or a tuple of scalars
+        values      value of each parameter by name, a scalar or a tuple of scalars
         directions  "light", "view" and "u": tuples of three scalars
         """
         if formula not in self._replayed:
@@ -244,7 +250,7 @@ class Program:
         return assembled(self.module, name, type, values, self.adapter.unset_is_zero)
 
     def color(self, value: Value) -> Value:
-        """A result as a color; a number becomes gray."""
+        """Convert a result to a color; a number becomes gray."""
         parts = leaves(value)
         if len(parts) not in (1, 3, 4):
             raise InputError(
@@ -254,7 +260,7 @@ class Program:
         return numeric(red), numeric(green), numeric(blue)
 
     def samplers(self) -> list[str]:
-        """The names of the module's textures."""
+        """The names of the textures in the module."""
         kinds = {id: self.module.type(one.type).parts[0] for id, one in self.module.variables.items()}
         return [
             self.module.names.get(id, "")
@@ -263,11 +269,11 @@ class Program:
         ]
 
     def argument_names(self, formula: str) -> list[str]:
-        """The names of a formula's arguments."""
+        """The names of the arguments of a formula."""
         return [self.module.names.get(id, f"argument {id}") for id, _ in self.formulas[formula][0].parameters]
 
     def members(self, formula: str) -> list[str]:
-        """The names of the members of a formula's result; empty if it is not a struct."""
+        """The names of the members of a formula's result; empty if the result is not a struct."""
         type = self.formulas[formula][0].type
         count = len(self.module.type(type).parts) if self.module.type(type).kind == "struct" else 0
         return [self.module.members.get((type, place), "") for place in range(count)]

@@ -1,4 +1,4 @@
-"""The files of a shader's textures: .npy, and numbers without a header, as `gonio emit` writes them."""
+"""Read the files of a shader's textures: .npy, and numbers without a header, as `gonio emit` writes them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ from ...errors import InputError
 from ...ops.table import Table
 from ...spirv.images import Texture
 
-MAX_TABLE = 1 << 28  # bytes of a file
+MAX_TABLE = 1 << 28  # maximum size of a file in bytes
 MAX_NUMBERS = 1 << 26
 _RAW: dict[str, np.dtype[Any]] = {".f32": np.dtype("<f4"), ".f16": np.dtype("<f2")}
 
 
 def texture(name: str, about: Mapping[str, Any], path: Path, stated: str = "") -> Texture:
-    """The texture of a file, with the edge rule and filter that the adapter's entry `about` gives.
+    """Read a texture from a file, with the edge rule and filter given by the adapter's entry `about`.
 
-    name    the texture's name in the shader
-    stated  the adapter, for errors
-    Raises InputError if it is not a table of finite numbers, and before more than `MAX_NUMBERS` are allocated.
+    name    name of the texture in the shader
+    stated  name of the adapter in errors
+    Raises InputError if the file is not a table of finite numbers, or if it contains more than `MAX_NUMBERS`, which are
+    not allocated.
     """
     where = f"{stated}: textures.{name}" if stated else f"textures.{name}"
     try:

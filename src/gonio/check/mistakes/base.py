@@ -1,4 +1,4 @@
-"""Types and functions for all families of mistakes."""
+"""Types and functions shared by all families of mistakes."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ _SIGMA = "sigma"
 
 
 def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """Wrong forms of the Oren-Nayar model; nothing for other materials."""
+    """Incorrect forms of the Oren-Nayar model; none for other materials."""
     if type(material).name != "oren-nayar":
         return
     sigma = float(np.max(np.asarray(material.sigma)))  # type: ignore[attr-defined]

@@ -19,7 +19,7 @@ _COSINE = "the cosines: (n.l) belongs to the diffuse part alone"
 
 
 def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """Wrong forms of Phong and Blinn-Phong; nothing for other materials."""
+    """Incorrect forms of the Phong and Blinn-Phong models; none for other materials."""
     name = type(material).name
     if name not in NAMES:
         return
@@ -63,7 +63,7 @@ def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant
 
 
 def with_cosine(material: BSDF) -> bool:
-    """Whether the course includes the cosine in the model, so that values with and without it are right."""
+    """Whether the course includes the cosine in the model, so that values with and without the cosine are accepted."""
     return type(material).name in NAMES
 
 

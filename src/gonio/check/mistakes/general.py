@@ -1,4 +1,4 @@
-"""Mistakes that any material may contain, in choices of terms, units, channels and directions."""
+"""Mistakes that are possible in any material: in the choice of terms, in units, in channels and in directions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _widths(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]
 
 
 def _choices(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """Another distribution, masking term, Fresnel term or form, in the material itself or in one inside it."""
+    """A different distribution, masking term, Fresnel term or form, in the material itself or in an inner material."""
     for path, inner in tree.walk(material):
         for name, parameter in type(inner).parameters().items():
             if not isinstance(parameter, ChoiceParameter) or name == "sampling":

@@ -23,7 +23,7 @@ _DENOMINATOR = "the denominator 4 (n.o)(n.i)"
 
 
 def variants(material: BSDF, wo: np.ndarray, wi: np.ndarray) -> Iterator[Variant]:
-    """Wrong forms of an isotropic microfacet reflection; nothing for other materials."""
+    """Incorrect forms of an isotropic microfacet reflection; none for other materials."""
     surface = material.microsurface
     if surface is None or np.size(np.asarray(surface.alpha)) != 1 or surface.ndf not in _DENSITIES:
         return
@@ -69,7 +69,7 @@ Factors = Iterator[tuple[str, str, Values]]
 
 
 def density(ndf: str, cosine: Values, alpha: float, name: str = "") -> Values:
-    """D of the distribution `ndf` at the cosine of the half vector, or its wrong form `name`."""
+    """D of the distribution `ndf` at the cosine of the half vector, or its incorrect form `name`."""
     t2 = 1.0 / cosine**2 - 1.0
     return _DENSITIES[ndf][name](cosine, t2, alpha)
 
@@ -144,7 +144,7 @@ def _half_vectors(t: _Terms) -> Factors:
 
 
 def g1(name: str, cosine: Values, alpha: float) -> Values:
-    """The masking G1 of one direction, in the forms of the sheet and the homework and in wrong ones."""
+    """The masking function G1 of one direction, in the forms of the sheet and the homework and in incorrect forms."""
     tangent = np.sqrt(np.maximum(1.0 / cosine**2 - 1.0, 0.0))
     if name == "ggx":
         return 2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * tangent**2))

@@ -1,1 +1,1 @@
-"""The verbs, one file each. A new one is one new file in this folder: discovery finds it."""
+"""The verbs, one file each. To add a verb, add a file to this folder: it is discovered automatically."""

@@ -1,4 +1,4 @@
-"""`gonio adopt`."""
+"""The command `gonio adopt`."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ def adopt(
     force: Annotated[bool, Option("--force", help="Replace existing files.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write an adapter that states which function of a shader is its BRDF, and what the arguments mean.
+    """Write an adapter that specifies which function of a shader is its BRDF, and the meaning of its arguments.
 
-    The adapter, FILE.toml, is a first guess based on the names of functions, arguments and uniforms; the guesses are
-    printed. If FILE is the folder of an engine, either an npm package or a checkout of its repository, shaders that
-    include the engine's code are written instead, with their adapters.
+    The adapter, FILE.toml, is inferred from the names of functions, arguments and uniforms, and each guess is printed.
+    If FILE is the folder of an engine, either an npm package or a checkout of its repository, shaders that include the
+    engine's code are written instead, with their adapters.
 
     \b
     Examples:

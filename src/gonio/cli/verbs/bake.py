@@ -1,4 +1,4 @@
-"""`gonio bake`."""
+"""The command `gonio bake`."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from .base import MATERIALS, verb
 
 
 class Baking(Options):
-    """The tables to bake, and the method."""
+    """Options that select the tables to bake and the integration method."""
 
     lut: Annotated[
         str, Option(metavar="E,Eavg,dfg,glass,ltc,prefiltered", help="Tables to bake, separated by commas.")
     ] = ""
     resolution: Annotated[
         int | None,
-        Option(metavar="N", help="Number of texels along each axis; 128 by default, for ltc 64 (anisotropic: 16)."),
+        Option(metavar="N", help="Number of texels along each axis; 128 by default, or 64 for ltc (anisotropic: 16)."),
     ] = None
     method: Annotated[
         str,
         Option(
-            metavar="NAME", help="Integration method: quadrature, or the density to sample (cosine, ggx, visible, ...)."
+            metavar="NAME", help="Integration method: quadrature, or a sampling density (cosine, ggx, visible, ...)."
         ),
     ] = "quadrature"
     masking: Annotated[
         str | None,
         Option(metavar="NAME", help="Masking term of a distribution, such as smith-correlated or FILE.py:CLASS."),
     ] = None
-    samples: Annotated[int, samples_option("Number of random samples per texel, for methods that sample.")] = 1024
+    samples: Annotated[int, samples_option("Number of samples per texel, for all methods except quadrature.")] = 1024
     sampler: Annotated[
-        str, Option(metavar="NAME", help="Sampler for methods that sample: hammersley, stratified or independent.")
+        str,
+        Option(metavar="NAME", help="Sampler of all methods except quadrature: hammersley, stratified or independent."),
     ] = "hammersley"
     seed: Seed = None
     layout: Annotated[
@@ -53,16 +54,16 @@ class Baking(Options):
         ),
     ] = None
     azimuths: Annotated[int, Option(metavar="N", help="Number of azimuths in anisotropic tables.")] = 24
-    store: Annotated[str, Option(metavar="E|1-E", help="Quantity that the pictures of --layout homework store.")] = "E"
+    store: Annotated[str, Option(metavar="E|1-E", help="Quantity stored in the pictures of --layout homework.")] = "E"
     flip: Annotated[
         bool, Option("--flip/--no-flip", help="Put the lowest roughness at the bottom of the homework pictures.")
     ] = True
     floor: Annotated[float, Option(metavar="X", help="Lower bound of the denominator of D, for --method cosine.")] = 0.0
     wrap: Annotated[
-        bool, Option("--wrap", help="Round bytes down and wrap them at 256, as the homework's program does.")
+        bool, Option("--wrap", help="Truncate values to bytes, modulo 256, as the program of homework 4 does.")
     ] = False
     ndf: Annotated[
-        str | None, Option(metavar="NAME", help="Distribution that blurs an environment, such as ggx or FILE.py:CLASS.")
+        str | None, Option(metavar="NAME", help="Distribution for blurring environments, such as ggx or FILE.py:CLASS.")
     ] = None
     levels: Annotated[
         int | None,
@@ -71,7 +72,7 @@ class Baking(Options):
 
 
 def _refuse(made: Material, options: dict[str, object]) -> None:
-    """Raise InputError for options that a preset of the homework sets itself."""
+    """Raise InputError for options whose values are set by a preset of the homework."""
     given = [name for name, value in options.items() if value != getattr(Baking(), name) and value is not None]
     given += ["param"] if made.param else []
     if given:
@@ -97,17 +98,18 @@ def bake(
     executor: Executor,
     as_json: Json = False,
 ) -> None:
-    """Write tables of directional albedo, its average, the split sum and rough glass, with their errors.
+    """Write tables of directional albedo, average albedo, the split sum and rough glass, with their errors.
 
     The text of homework 4 uses k = (roughness + 1)^2 / 8, but its figures use k = alpha / 2. --preset homework-text
     bakes the tables of the text, and --preset homework-figure bakes those of the figures, with the same sampling.
 
-    Tables of an anisotropic distribution have a third axis, the azimuth. For a material without roughness, E is a
-    function of the cosine alone. For an environment, its light is blurred for each roughness; the split sum multiplies
-    this light by the albedo.
+    Tables of an anisotropic distribution have a third axis, the azimuth. For a material without roughness, E depends
+    only on the cosine. An environment is blurred once per roughness; the split sum multiplies the blurred light by the
+    albedo.
 
     `--lut ltc` fits linearly transformed cosines to a material, and writes the tables, their error, and shader code for
-    area lights. Tables of an anisotropic material also have an azimuth axis, and by default 16 texels along the others.
+    area lights. Tables of an anisotropic material also have an azimuth axis, and by default 16 texels along the other
+    axes.
 
     \b
     Examples:

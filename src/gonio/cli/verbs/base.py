@@ -1,11 +1,11 @@
-"""Verbs of the command line: a verb is a function with Typer annotations, and its place in the help.
+"""Verbs, the subcommands of `gonio`. A verb consists of a function with Typer annotations and a position in the help.
 
     @verb(MATERIALS)
     def sheen(model: Model, made: Material, as_json: Json = False) -> None:
         \"\"\"Print the sheen of a material.\"\"\"
 
-Gonio's verbs are files in `cli/verbs`; other packages declare theirs as entry points in the group `gonio.verbs`. A
-parameter whose type is a group of options, such as `Material` or your own dataclass, becomes one option per field.
+Gonio's verbs are files in `cli/verbs`; other packages declare their verbs as entry points in the group `gonio.verbs`. A
+parameter whose type is a group of options, such as `Material` or a dataclass of your own, becomes one option per field.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Verb:
     def __init__(self, function: Callable[..., None], panel: str, place: int) -> None:
         self.function, self.panel, self.place = function, panel, place
         self.name = function.__name__.replace("_", "-")
-        functools.update_wrapper(self, function)  # so that its source file is that of the function
+        functools.update_wrapper(self, function)  # so that the source file of the verb is that of the function
 
     def __call__(self, *args: object, **options: object) -> None:
         self.function(*args, **options)
@@ -41,7 +41,7 @@ class Verb:
         return inspect.cleandoc(self.function.__doc__ or "").partition("\n")[0]
 
     def with_single_options(self) -> Callable[..., None]:
-        """The function with its groups of options expanded to one option per field, as Typer expects."""
+        """The function with each group of options expanded to one parameter per field, as Typer expects."""
         hints = get_type_hints(self.function, include_extras=True)
         groups: dict[str, tuple[type, list[str]]] = {}
         single: list[inspect.Parameter] = []
@@ -70,7 +70,8 @@ class Verb:
 
 
 def verb(panel: str, place: int = 100) -> Callable[[Callable[..., None]], Verb]:
-    """Decorate a function as a verb; `place` orders the verbs under a heading, by default after Gonio's own."""
+    """Decorate a function as a verb. `place` orders the verbs under a heading; by default, the verb follows Gonio's
+    own."""
     return lambda function: Verb(function, panel, place)
 
 

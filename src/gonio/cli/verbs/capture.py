@@ -1,4 +1,4 @@
-"""`gonio capture`."""
+"""The command `gonio capture`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,12 @@ Photographs = Annotated[
 ]
 Models = Annotated[
     list[str] | None,
-    Option("--model", "-m", metavar="NAME", help='Model to fit, such as "lambert+ggx"; repeatable, to rank several.'),
+    Option(
+        "--model",
+        "-m",
+        metavar="NAME",
+        help='Model to fit, such as "lambert+ggx"; repeatable; several models are ranked.',
+    ),
 ]
 
 
@@ -34,13 +39,13 @@ def capture(
     *,
     output: Annotated[
         Path | None,
-        output_option("FILE", "Table (.gonio, .binary, ...) or fit (.json); a figure is written next to it."),
+        output_option("FILE", "File for the table (.gonio, .binary, ...) or fit (.json), with a figure next to it."),
     ] = None,
     model: Models = None,
     how: Fitting,
     calibration: Annotated[
         Path | None,
-        Option(metavar="FILE", help="Calibration file; by default calibration.json in the folder of the photographs."),
+        Option(metavar="FILE", help="Calibration file; by default, calibration.json in the folder of the photographs."),
     ] = None,
     next_: Annotated[
         int, Option("--next", metavar="N", help="Number of further photographs for which to suggest lamp positions.")
@@ -92,7 +97,7 @@ def capture(
 
 
 def _write(result: Capture, target: Path) -> list[Path]:
-    """Write the table or the fit, and a figure of it; returns the files written."""
+    """Write the table or the fit, and a figure; returns the paths of the files."""
     from ...viewer import capture_figure
 
     written = [result.save(target), target.with_suffix(".png")]
@@ -101,7 +106,7 @@ def _write(result: Capture, target: Path) -> list[Path]:
 
 
 def _print_plan(plan: Sequence[Proposal], as_json: bool) -> None:
-    """Print the first photographs to take."""
+    """Print the plan for the first photographs."""
     if as_json:
         print(json.dumps([one.as_dict() for one in plan]))
     else:
@@ -118,6 +123,6 @@ def _print(result: Capture) -> None:
     for rank, one in zip(ranks, (result.fit, *result.others), strict=True):
         print(rank + one.text)
         print_intervals(one.names, one.values, one.interval)
-        ranked = f", criterion {one.criterion:.0f}" if rank else ""
-        noise = f", pixels by {100.0 * result.fitted.noise:.3g} %" if one is result.fit else ""
-        print(f"{100.0 * one.relative:.3g} % off on average{noise}{ranked}")
+        ranked = f", BIC {one.criterion:.0f}" if rank else ""
+        noise = f", pixel noise {100.0 * result.fitted.noise:.3g} %" if one is result.fit else ""
+        print(f"mean error {100.0 * one.relative:.3g} %{noise}{ranked}")

@@ -1,4 +1,4 @@
-"""`gonio check`."""
+"""The command `gonio check`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Judging(Options):
-    """Options of the check and of its report."""
+    """Options of a check and of its report."""
 
     scene: Annotated[
         Path | None, Option(metavar="FILE", help="Scene that the picture shows; with --sheet, a folder of scenes.")
@@ -27,16 +27,16 @@ class Judging(Options):
     sheet: Annotated[
         str | None, Option(metavar="hw4|lab2", help="Assignment sheet, to check a folder of submissions.")
     ] = None
-    up: Annotated[str, Option(metavar="z|y|x", help="Axis along the normal, for rows of directions.")] = "z"
+    up: Annotated[str, Option(metavar="z|y|x", help="Axis along the normal in rows of directions.")] = "z"
     tolerance: Annotated[
         float | None,
-        Option(metavar="X", help="Relative difference of f that counts as equal; by default 0.002 for rows of f."),
+        Option(metavar="X", help="Relative tolerance for values of f; 0.002 by default for rows of f."),
     ] = None
     hide_solution: Annotated[
         bool,
-        Option("--hide-solution", help="Print where a mistake is, but not the formulas and values of the solution."),
+        Option("--hide-solution", help="Print the location of a mistake, but no formulas or values of the solution."),
     ] = False
-    function: Annotated[str, Option(metavar="NAME", help="Name of the function to check in a shader.")] = ""
+    function: Annotated[str, Option(metavar="NAME", help="Name of the shader function to check.")] = ""
     junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="JUnit XML file for the verdicts.")] = None
 
 
@@ -50,7 +50,7 @@ def check(
         str | None,
         Argument(
             metavar="MODEL",
-            help="Correct material; for a table of E, the masking term that it must have.",
+            help="Reference material; for a table of E, the required masking term.",
             autocompletion=completion.materials,
         ),
     ] = None,
@@ -58,7 +58,7 @@ def check(
     how: Judging,
     made: Material,
     against: Annotated[
-        str | None, Option(metavar="MODEL", help="Correct material, given as an option instead of an argument.")
+        str | None, Option(metavar="MODEL", help="Reference material, as an alternative to the argument MODEL.")
     ] = None,
     reference: Annotated[
         Path | None,
@@ -70,12 +70,13 @@ def check(
     trust: Trust,
     as_json: Json = False,
 ) -> None:
-    """Check a student's work: whether it is right, how large the error is, and what the probable mistake is.
+    """Check a student's work, and report the size of the error and the probable mistake.
 
-    A table of E or E_avg is compared with every form that follows from the homework's text, from its figures or from a
-    common mistake. Classes, and rows of wo, wi and f from any program, are compared with MODEL pair by pair. A picture
-    may be shifted by up to two pixels, have a different exposure, and be stored with or without gamma. The exit code is
-    0 if everything is right, 1 if something is wrong or missing, and 2 if something cannot be read.
+    A table of E or E_avg is compared with every variant that results from the text of homework 4, from its figures or
+    from a common mistake. Classes, and rows of wo, wi and f from any program, are compared with MODEL for each pair of
+    directions. A picture may be shifted by up to two pixels, have a different exposure, and be stored with or without
+    gamma. The exit code is 0 if everything is right, 1 if something is wrong or missing, and 2 if something cannot be
+    read.
 
     \b
     Examples:
@@ -125,8 +126,8 @@ def _write_reference(folder: Path, material: str | None, made: Material, as_json
 def _with_parameters(
     target: str | None, model: str | None, against: str | None, made: Material
 ) -> tuple[str, str | None]:
-    """The work, and the material or masking term against which it is checked. Each of the given parameters is set on
-    the materials that have it."""
+    """The work, and the material or masking term with which it is compared. Each of the given parameters is set for
+    every material that has it."""
     from ...catalog import outside, shaders
     from ...optics.masking import Masking
 

@@ -1,4 +1,4 @@
-"""`gonio compare`."""
+"""The command `gonio compare`."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class Judging(Options):
     metric: Annotated[
         str | None,
         Option(
-            metavar="NAME", help="Metric for --tolerance: relmse, rmse or flip; for materials mean, largest or albedo."
+            metavar="NAME", help="Metric for --tolerance: relmse, rmse, flip; for materials: mean, largest, albedo."
         ),
     ] = None
     encoding: Annotated[
         str,
         Option(
-            metavar="srgb|linear", help="Encoding of .png files; linear is for files that store data, such as tables."
+            metavar="srgb|linear", help="Encoding of .png files; use linear for files that store data, such as tables."
         ),
     ] = "srgb"
 
@@ -55,7 +55,7 @@ def compare(
     ],
     *,
     how: Judging,
-    output: Annotated[Path | None, output_option("FILE", "File for a map of the error: .png, .pdf or .svg.")] = None,
+    output: Annotated[Path | None, output_option("FILE", "File for an error map: .png, .pdf or .svg.")] = None,
     made: Material,
     as_json: Json = False,
 ) -> None:
@@ -65,8 +65,8 @@ def compare(
     --encoding linear, it is read as linear data. For .exr, .hdr and .npz, FLIP is HDR-FLIP, the maximum over the
     exposures at which B can be displayed.
 
-    Materials are compared by the mean and the largest difference of f, and by their albedos. --param and --preset apply
-    to each material that has them.
+    Materials are compared by the mean and the largest difference of f, and by their albedos. --param and --preset are
+    applied to each material that has the parameter or preset.
 
     \b
     Examples:
@@ -100,7 +100,7 @@ def compare(
 
 
 def _are_pictures(test: str, reference: str) -> bool:
-    """True for two pictures, False for two materials. Raises InputError for one of each."""
+    """True for two pictures, False for two materials. Raises InputError for a picture and a material."""
     from ...catalog import operands
     from ...catalog.operands import Kind
     from ...errors import InputError
@@ -119,15 +119,15 @@ def _heading(a: str, b: str, result: Difference) -> list[str]:
     lines = [
         f"A           {a}",
         f"B           {b}",
-        f"mean        {100.0 * result.mean:.4g} % of B's light, over all light and views",
+        f"mean        {100.0 * result.mean:.4g} % of the light reflected by B, averaged over the views",
         f"largest     {100.0 * result.largest:.4g} % of the larger f: A {f_a:.4g}, B {f_b:.4g} 1/sr "
         f"at wo {at.theta:.3g}, wi {_angles(at)} degrees",
-        f"albedo      {result.albedo:.4g} apart at most",
+        f"albedo      largest difference {result.albedo:.4g}",
     ]
     if not result.known.everything:
-        lines.insert(2, f"compared    {result.known}, which both are known at")
+        lines.insert(2, f"compared    {result.known}, the angles at which both are known")
     if result.has_specular:
-        lines.append("specular    perfectly specular parts have no f, and count only in the albedo")
+        lines.append("specular    delta lobes have no finite f, and contribute only to the albedo")
     if result.tolerance is not None:
         relation, word = ("<=", "passes") if result.passed else (">", "fails")
         lines.append(f"{word:10}  {result.metric} {result.value(result.metric):.6g} {relation} {result.tolerance:g}")
@@ -144,5 +144,5 @@ def _print_views(result: Difference) -> None:
 
 
 def _angles(view: View) -> str:
-    """theta of wi, and phi relative to wo, in degrees, as `gonio verify --at` takes them."""
+    """theta of wi, and phi relative to wo, in degrees, in the form accepted by `gonio verify --at`."""
     return f"{view.wi[0]:.3g},{view.wi[1]:.3g}"

@@ -1,4 +1,4 @@
-"""`gonio compensation`."""
+"""The command `gonio compensation`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def compensation(
         list[str] | None,
         Argument(
             metavar="[MODEL]...",
-            help="Additional materials to compare: as methods if they have a base, otherwise as bases.",
+            help="Additional materials: those with a base are compared as methods, all others are used as bases.",
             autocompletion=completion.materials,
         ),
     ] = None,
@@ -47,12 +47,12 @@ def compensation(
 
 
 def _print(result: dict[str, Any]) -> None:
-    """Print a row for each method, and the albedos of bases without a reference random walk."""
+    """Print one row per method, and the albedos of bases that have no random walk as a reference."""
     import numpy as np
 
     names = list(result["rms"])
-    table = listing("method", *names, "loss", "recip.", "time")
-    print("RMS distance of the albedo to the random walk; largest loss in a white furnace; error of reciprocity; time")
+    table = listing("method", *names, "loss", "reciprocity", "time")
+    print("RMS error of the albedo against the random walk; largest loss in a white furnace; reciprocity error; time")
     for method in result["cost"]:
         distances = [result["rms"][n].get(method) for n in names]
         rms = ["" if d is None else f"{d:.3f}" if d >= 1e-3 else f"{d:.0e}" for d in distances]
@@ -62,4 +62,4 @@ def _print(result: dict[str, Any]) -> None:
     print_rich(table)
     for name in (n for n in names if not result["rms"][n]):
         means = (f"{method} {np.mean(values):.4f}" for method, values in result["albedo"][name].items())
-        print(f"{name}: albedo, the mean over roughness and angle: {', '.join(means)}")
+        print(f"{name}: mean albedo over roughness and angle: {', '.join(means)}")

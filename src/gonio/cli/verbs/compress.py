@@ -1,4 +1,4 @@
-"""`gonio compress`."""
+"""The command `gonio compress`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def compress(
     ],
     *,
     output: Annotated[Path, output_option("FILE", "File to write, with the suffix .gonio.")],
-    codec: Annotated[str, Option(metavar="NAME", help="Method of compression: log, lowrank, rgl or network.")] = "log",
+    codec: Annotated[str, Option(metavar="NAME", help="Compression method: log, lowrank, rgl or network.")] = "log",
     bytes: Annotated[int, Option(metavar="N", help="Size per material in bytes, for log and lowrank.")] = 16384,
     as_json: Json = False,
 ) -> None:
@@ -28,7 +28,7 @@ def compress(
 
     The codec log stores the logarithms as rounded cosine coefficients; lowrank stores low-rank factors, which several
     materials can share; rgl stores an RGL table without its density of visible normals; and network trains a neural
-    network and stores its 675 weights. The result can be used wherever a measured file can.
+    network and stores its 675 weights. The compressed file can be used like any other file of measured values.
 
     \b
     Examples:
@@ -47,7 +47,7 @@ def compress(
     if as_json:
         print(json.dumps([row.as_dict() for row in rows] if len(rows) > 1 else rows[0].as_dict()))
         return
-    table = listing("", "bytes", "of", "off on average", "on a sphere")
+    table = listing("file", "bytes", "original bytes", "mean error", "error on a sphere")
     for row in rows:
         table.add_row(
             row.path, f"{row.size:,}", f"{row.before:,}", f"{100.0 * row.error:.2g} %", f"{100.0 * row.sphere:.2g} %"

@@ -1,4 +1,4 @@
-"""`gonio convert`."""
+"""The command `gonio convert`."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def convert(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write a picture, a measured material, or another program's material in another format.
+    """Convert a picture, a measured material, or another program's material to another format.
 
-    A picture is tone-mapped without rendering it again. Measured values are copied if both formats have the same kind
-    of table; otherwise, they are resampled, and the resulting error is reported. A material from a glTF or MaterialX
-    file is converted to JSON for use in scenes, and an openpbr material is converted to a MaterialX file.
+    A picture is tone-mapped without rendering the scene again. Measured values are copied if both formats have the same
+    kind of table; otherwise, they are resampled, and the resulting error is reported. A material from a glTF or
+    MaterialX file is converted to JSON for use in scenes, and an openpbr material is converted to a MaterialX file.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""`gonio doctor`."""
+"""The command `gonio doctor`."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .base import SUPPORT, verb
 @verb(SUPPORT, place=2)
 def doctor(
     bench: Annotated[
-        bool, Option("--bench", help="Measure the speed, and compare it with that of Mitsuba's own plugins.")
+        bool, Option("--bench", help="Run a benchmark that compares Gonio with Mitsuba's own plugins.")
     ] = False,
     device: Device = "cpu",
     as_json: Json = False,
 ) -> None:
-    """Report what this machine can render with, what is missing, and how to install it.
+    """Report which components for rendering are available on this machine, and how to install missing ones.
 
     The exit code is 3 if the machine cannot render at all. --bench prints a short table of speeds for bug reports:
-    rays, eval and sample of a material, direct lighting, and paths, in millions per second.
+    rays, calls of a material's eval and sample, direct lighting, and paths, in millions per second.
 
     \b
     Examples:

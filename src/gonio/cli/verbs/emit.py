@@ -1,4 +1,4 @@
-"""`gonio emit`."""
+"""The command `gonio emit`."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from .base import MATERIALS, verb
 if TYPE_CHECKING:
     from ...shaders.bundle import Bundle
 
-SLASHES = tuple({"/", os.sep})  # at the end of a folder's name
+SLASHES = tuple({"/", os.sep})  # the name of a folder ends with one of these
 
 
 class Place(Options):
-    """The place of a shader in a module with other code, and the files of its tables."""
+    """Options for embedding a shader in other code, and for the files of its tables."""
 
     prefix: Annotated[str, Option(metavar="TEXT", help="Prefix of all global names, such as g_.")] = ""
-    group: Annotated[int, Option(metavar="N", help="Binding group of the tables; GLSL ES has none.")] = 0
+    group: Annotated[int, Option(metavar="N", help="Binding group of the tables; not used in GLSL ES.")] = 0
     first_binding: Annotated[int, Option(metavar="N", help="Binding number of the first table.")] = 0
     tables: Annotated[
         str, Option(metavar="raw|exr|ktx2", help="Format of the table files in a folder; raw float32 by default.")
     ] = ""
     half: Annotated[
-        bool, Option("--half", help="Write 16-bit tables, and state the errors of 16-bit tables and parameters.")
+        bool, Option("--half", help="Write 16-bit tables, and report the errors of 16-bit tables and parameters.")
     ] = False
 
 
@@ -44,14 +44,14 @@ class Content(Options):
         bool, Option("--lean", help="Omit layers that the parameters switch off, such as a coat of weight 0.")
     ] = False
     constants: Annotated[
-        bool, Option("--constants", help="Also write the material's own values as a constant of the struct type.")
+        bool, Option("--constants", help="Also write the material's parameters as a constant of the struct type.")
     ] = False
-    fold: Annotated[bool, Option("--fold", help="Insert the material's own values into the code as constants.")] = False
+    fold: Annotated[bool, Option("--fold", help="Replace the parameters in the code by their values.")] = False
     fit: Annotated[
         str,
         Option(
             metavar="N|N/M",
-            help="Order of rational fits to the albedos, written instead of the material; N/0: polynomials.",
+            help="Write rational fits of degree N/M to the albedos instead of the material; N/0 gives polynomials.",
         ),
     ] = ""
     ibl: Annotated[
@@ -59,7 +59,7 @@ class Content(Options):
     ] = False
     budget: Annotated[
         int,
-        Option(metavar="N", help="Largest number of operations; the most accurate terms, table or fit is selected."),
+        Option(metavar="N", help="Operation limit; the most accurate terms, table or fit within it is selected."),
     ] = 0
 
 
@@ -67,7 +67,7 @@ Models = Annotated[
     list[str],
     Argument(
         metavar="MODEL",
-        help="Material; several are written to one module and share the options.",
+        help="Material; several materials are written to one module, with the same options.",
         autocompletion=completion.materials,
     ),
 ]
@@ -98,14 +98,14 @@ def emit(
     check: Annotated[
         int,
         Option(
-            metavar="N", help="Number of direction pairs to write as JSON, with 64-bit values, instead of a shader."
+            metavar="N", help="Write double-precision values for N pairs of directions as JSON, instead of a shader."
         ),
     ] = 0,
     as_json: Json = False,
 ) -> None:
-    """Translate a material from its source to GLSL, WGSL, HLSL, Python or a language of your own.
+    """Translate the source code of a material to GLSL, WGSL, HLSL, Python or a language of your own.
 
-    -o may be given twice. A name that ends in / denotes a folder, whose tables are raw float32 unless --tables selects
+    -o may be given twice. A name that ends in / denotes a folder; its tables are raw float32 unless --tables selects
     another format.
 
     \b

@@ -1,4 +1,4 @@
-"""`gonio explain`."""
+"""The command `gonio explain`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def explain(
         str,
         Argument(
             metavar="[NAME]",
-            help="Material, other member of a family (ggx, smith-correlated, path), or family (fresnel).",
+            help="Material, member of another family (ggx, smith-correlated, path), or family (fresnel).",
             autocompletion=completion.materials_and_distributions,
         ),
     ] = "",
@@ -29,8 +29,8 @@ def explain(
 ) -> None:
     """Print the manual page of a material, or of any member of a family: formula, parameters, limits, source.
 
-    The families are materials, distributions of normals, masking terms, Fresnel terms, integrators, laws and more. For
-    the name of a family, the command lists its members; without a name, it lists the families.
+    The families are materials, distributions of normals, masking terms, Fresnel terms, integrators, laws and more. If
+    NAME is a family, its members are listed; without NAME, the families are listed.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""`gonio fit`."""
+"""The command `gonio fit`."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ class Model(Options):
             "--model",
             "-m",
             metavar="NAME",
-            help='Model to fit, such as "lambert+ggx"; repeatable, to rank several models.',
+            help='Model to fit, such as "lambert+ggx"; repeatable; several models are ranked.',
         ),
     ] = None
-    lobes: Annotated[int, Option(metavar="N", help="Number of times that the model's last lobe is included.")] = 1
+    lobes: Annotated[int, Option(metavar="N", help="Number of copies of the model's last lobe.")] = 1
     loss: Annotated[str, Option(metavar="NAME", help="Loss to minimize: relative, log, log1p, cuberoot or linear.")] = (
         "relative"
     )
 
 
 class Scene(Options):
-    """The scene whose materials are fitted to a picture of it."""
+    """The scene whose materials are fitted to a picture."""
 
     scene: Annotated[
-        Path | None, Option(metavar="FILE", help="Scene whose materials are fitted to DATA, a picture of it.")
+        Path | None, Option(metavar="FILE", help="Scene whose materials are fitted to the picture DATA.")
     ] = None
     spp: Spp = 64
 
@@ -64,13 +64,13 @@ def fit(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Fit materials to measured values, and print the parameters with 95 % intervals.
+    """Fit materials to measured values, and print the parameters with 95 % confidence intervals.
 
-    -p NAME=VALUE fixes a parameter. Several models are ranked by the Bayesian information criterion (BIC): the lowest
-    value is best, and an extra parameter must lower it. With several files, each result is stored as soon as it is
-    computed; to continue after Ctrl-C, run the same command again.
+    -p NAME=VALUE fixes a parameter. Several models are ranked by the Bayesian information criterion (BIC), which
+    penalizes additional parameters; the lowest value is best. With several files, each result is stored as soon as it
+    is computed; to continue after Ctrl-C, run the same command again.
 
-    With --scene, materials of the scene are fitted to a picture of it. --free selects a parameter, such as
+    With --scene, materials of the scene are fitted to a picture of the scene. --free selects a parameter, such as
     shapes.0.material.alpha, or all parameters of a material; the default is shapes.0.material. --model replaces that
     material, and -p sets values in the scene.
 
@@ -130,7 +130,7 @@ def _nothing(scene: Path | None) -> InputError:
 
 
 def _measurements(data: list[str]) -> list[str]:
-    """The files. Raises InputError if the only one is a picture."""
+    """The files. Raises InputError if there is only one, and it is a picture."""
     if len(data) == 1 and Path(data[0]).suffix.lower() in PICTURES:
         hint = f"gonio fit {data[0]} --scene scene.json"
         raise InputError(f"'{data[0]}' is a picture, but --scene is not given", "--scene", hint)
@@ -152,7 +152,7 @@ def _to_picture(
     target: Path | None,
     as_json: bool,
 ) -> None:
-    """Fit a scene's materials to a picture of it."""
+    """Fit a scene's materials to a picture of the scene."""
     from ...catalog import notation
     from ...instruments import pictures
     from ...viewer import figures
@@ -180,7 +180,7 @@ def _to_picture(
     for path, material in result.materials.items():
         print(f"{path}  {notation.written(material)}")
     print_intervals(result.names, result.values, result.interval)
-    print(f"{100.0 * result.relative:.3g} % off on average, {len(result.losses) - 1} steps, {result.seconds:.1f} s")
+    print(f"mean error {100.0 * result.relative:.3g} %, {len(result.losses) - 1} steps, {result.seconds:.1f} s")
     for note in result.notes:
         print(f"note: {note}")
     if target is not None:
@@ -198,8 +198,8 @@ def _print(row: dict) -> None:
             table.add_row(name, f"{about['value']:.5g}", reach)
         print_rich(table)
         print(
-            f"   {100.0 * one['relative']:.3g} % off on average, {one['error']:.4g} ({one['metric']}), "
-            f"criterion {one['criterion']:.0f}, {one['values']} values, {one['seconds']:.1f} s"
+            f"   mean error {100.0 * one['relative']:.3g} %, {one['error']:.4g} ({one['metric']}), "
+            f"BIC {one['criterion']:.0f}, {one['values']} values, {one['seconds']:.1f} s"
         )
         for note in one["notes"]:
             print(f"   note: {note}")

@@ -1,4 +1,4 @@
-"""`gonio info`."""
+"""The command `gonio info`."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def info(
     ],
     as_json: Json = False,
 ) -> None:
-    """Describe a file: a measured material, baked tables, or materials in a .gltf, a .mtlx or the .json of a fit.
+    """Describe a file of measured values, a folder of baked tables, or the materials in a .gltf, .mtlx or .json file.
 
-    For a measured material, print its dimensions, ranges, invalid and negative values, albedo by angle, energy and
-    reciprocity.
+    For measured values, the output lists the dimensions, ranges, invalid and negative values, albedo by angle, energy
+    and reciprocity.
 
     \b
     Examples:

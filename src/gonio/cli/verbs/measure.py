@@ -1,4 +1,4 @@
-"""`gonio measure`."""
+"""The command `gonio measure`."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .base import MATERIALS, verb
 if TYPE_CHECKING:
     from ...instruments.goniometer.run import Readout
 
-MAX_ROWS = 12  # most angles of incidence that are listed
+MAX_ROWS = 12  # largest number of angles of incidence that are listed
 
 
 class Detector(Options):
-    """The positions of the detector, and its imperfections."""
+    """Options that describe the positions of the detector and its imperfections."""
 
     theta_i: Annotated[
         str | None,
@@ -33,12 +33,12 @@ class Detector(Options):
         str | None, Option(metavar="DEG", help="Viewing angles in degrees, in the same form as --theta-i.")
     ] = None
     phi: Annotated[
-        str | None, Option(metavar="DEG", help="Azimuths between light and view, from 0 to 180 degrees.")
+        str | None, Option(metavar="DEG", help="Differences in azimuth between light and view, from 0 to 180 degrees.")
     ] = None
     solid_angle: Annotated[
         float | None,
         Option(
-            metavar="SR", help="Solid angle of the detector; by default 0.006 sr for surfaces, a point for materials."
+            metavar="SR", help="Solid angle of the detector; by default, 0.006 sr for surfaces and 0 for materials."
         ),
     ] = None
     noise: Annotated[
@@ -58,7 +58,7 @@ class Detector(Options):
 
 
 class Specimen(Options):
-    """A surface of facets, and the rays sent to it."""
+    """Options that describe a rough surface and the rays traced to it."""
 
     surface: Annotated[
         str | None,
@@ -73,7 +73,7 @@ class Specimen(Options):
     ] = "mirror"
     bounces: Annotated[str, Option(metavar="NAME", help="Bounces to count: all, first or later.")] = "all"
     samples: Annotated[int, samples_option("Number of rays per angle of incidence.")] = 1_000_000
-    patches: Annotated[int, Option(metavar="N", help="Number of patches of a random surface to measure.")] = 16
+    patches: Annotated[int, Option(metavar="N", help="Number of patches to measure, for random surfaces.")] = 16
     seed: Seed = None
     device: Device = "cpu"
 
@@ -95,11 +95,10 @@ def measure(
     specimen: Specimen,
     as_json: Json = False,
 ) -> None:
-    """Measure a material, or a surface of facets, with a virtual gonioreflectometer.
+    """Measure a material, or a rough surface made of facets, with a virtual gonioreflectometer.
 
-    Rays are traced to the surface and bounce until they leave it; the detector counts them. Any material can be
-    measured too, and the output can have any format that Gonio writes. Each value has a standard error, which .gonio
-    files store.
+    For a rough surface, rays are traced until they leave the surface, and the detector counts them. The output can have
+    any format that Gonio writes. Each measured value has a standard error, which is stored in .gonio files.
 
     \b
     Examples:
@@ -134,16 +133,16 @@ def measure(
 
 
 def _print(readout: Readout) -> None:
-    error = "" if readout.error is None else f", standard error {100.0 * readout.error:.2g} % in the median"
+    error = "" if readout.error is None else f", median standard error {100.0 * readout.error:.2g} %"
     hidden = f", {100.0 * readout.blocked:.2g} % blocked" if readout.blocked else ""
     print(f"{readout.path}  {readout.table.title}: {readout.cells} cells{hidden}{error}")
     if readout.rays:
         rate = readout.rays / readout.seconds / 1e6
         print(
-            f"{readout.rays / 1e6:.1f} M rays in {readout.seconds:.1f} s ({rate:.2f} M/s); shares of the light "
-            "that leave:"
+            f"{readout.rays / 1e6:.1f} M rays in {readout.seconds:.1f} s ({rate:.2f} M/s); fractions of the light "
+            "that leave the surface:"
         )
-        table = listing("incidence", "first bounce", "later ones", "all", "lost")
+        table = listing("incidence", "first bounce", "later bounces", "total", "lost")
         rows = list(zip(readout.incidence, readout.first, readout.later, readout.lost, strict=True))
         for angle, first, later, lost in rows[:: -(-len(rows) // MAX_ROWS)]:
             table.add_row(f"{angle:.4g}", f"{first:.4f}", f"{later:.4f}", f"{first + later:.4f}", f"{lost:.1e}")

@@ -1,4 +1,4 @@
-"""`gonio models`."""
+"""The command `gonio models`."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def models(
     if as_json:
         print(json.dumps({name: {"doc": doc, "parameters": parameters} for name, (doc, parameters) in rows.items()}))
         return
-    table = listing("material", "what it is", "parameters")
+    table = listing("material", "description", "parameters")
     for name, (doc, parameters) in rows.items():
         table.add_row(name, doc, ", ".join(parameters))
     print_rich(table)
@@ -64,10 +64,10 @@ def _library(as_json: bool) -> None:
     for name, fit in published.items():
         table.add_row(name, fit.model, fit.source, str(len(fit.materials)))
     print_rich(table)
-    table = listing("material", "fits; the first is the default")
+    table = listing("material", "fits (default first)")
     for name, fits_of in rows.items():
         left = sorted({fit.split("/")[0] for fit in published if fit not in fits_of})
-        table.add_row(name, f"all but those of {', '.join(left)}" if left else "all")
+        table.add_row(name, f"all except those of {', '.join(left)}" if left else "all")
     print_rich(table)
 
 

@@ -1,4 +1,4 @@
-"""`gonio new`."""
+"""The command `gonio new`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...errors import InputError, did_you_mean
 from ..options import Json, output_option
 from .base import MATERIALS, verb
 
-TEMPLATES = Path(__file__).parents[1] / "templates"  # a folder for each kind, with $file and $title to fill in
+TEMPLATES = Path(__file__).parents[1] / "templates"  # one folder per kind; $file and $title are placeholders
 
 
 def _kinds() -> list[str]:
@@ -26,7 +26,7 @@ def _kinds() -> list[str]:
 def new(
     kind: Annotated[str, Argument(metavar="material", help="Kind of file to create.", autocompletion=_kinds)],
     name: Annotated[str, Argument(metavar="NAME", help="Name of the material, such as velvet or crushed-velvet.")],
-    output: Annotated[Path, output_option("DIR", "Folder for the two files.")] = Path(),
+    output: Annotated[Path, output_option("DIR", "Folder for the material and its test.")] = Path(),
     as_json: Json = False,
 ) -> None:
     """Create a material of your own: a working example, NAME.py, and a passing test, test_NAME.py.

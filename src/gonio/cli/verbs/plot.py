@@ -1,4 +1,4 @@
-"""`gonio plot`."""
+"""The command `gonio plot`."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from .base import MATERIALS, verb
 
 
 class Interface(Options):
-    """The interface of `gonio plot fresnel`."""
+    """The interface whose reflectance `gonio plot fresnel` plots."""
 
     eta: Annotated[
-        float | None, Option(metavar="ETA", help="Relative index of refraction, inside / outside, for fresnel.")
+        float | None, Option(metavar="ETA", help="Relative index of refraction, inside / outside; only for fresnel.")
     ] = None
     k: Annotated[
-        float, Option("--k", metavar="K", help="Imaginary part of the relative index of refraction, for fresnel.")
+        float, Option("--k", metavar="K", help="Imaginary part of the relative index of refraction; only for fresnel.")
     ] = 0.0
-    metal: Annotated[str | None, Option(metavar="NAME", help="Metal, such as Au, for fresnel.")] = None
+    metal: Annotated[str | None, Option(metavar="NAME", help="Metal, such as Au; only for fresnel.")] = None
 
 
 @verb(MATERIALS, place=1)
@@ -31,7 +31,7 @@ def plot(
         list[str],
         Argument(
             metavar="MODEL...",
-            help="Materials, as listed by `gonio models`; or a folder of baked tables, or fresnel.",
+            help="Materials (listed by `gonio models`), a folder of baked tables, or fresnel.",
             autocompletion=completion.materials,
         ),
     ],
@@ -45,10 +45,10 @@ def plot(
     output: Annotated[Path | None, output_option("FILE", "File for the figure: .png, .pdf or .svg.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Plot materials (as lobes, slices, albedo or image slices), a folder of baked tables, or a Fresnel reflectance.
+    """Plot materials (as lobes, slices, albedos or image slices), a folder of baked tables, or a Fresnel reflectance.
 
     Lobes are polar plots; slices show f as a function of angle. A dashed line shows the sampling density of a material.
-    Several materials are plotted on the same axes. The name fresnel plots the reflectance of an interface.
+    Several materials are plotted on the same axes. The argument fresnel plots the reflectance of an interface.
 
     \b
     Examples:
@@ -81,8 +81,8 @@ def plot(
 
 
 def _file_name(head: str) -> str:
-    """The name of a material in a file name: for FILE.py:CLASS the class, after the file's name if that differs; for
-    JSON, "material"."""
+    """The name of a material for use in a file name: for FILE.py:CLASS, the class, preceded by the file's name if that
+    is different; for JSON, "material"."""
     if head.startswith("{"):
         return "material"
     file, _, name = head.lower().rpartition(".py:")

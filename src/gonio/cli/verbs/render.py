@@ -1,4 +1,4 @@
-"""`gonio render`."""
+"""The command `gonio render`."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ def render(
     executor: Executor,
     as_json: Json = False,
 ) -> None:
-    """Render a scene, or a material on a ball, to a picture.
+    """Render a picture of a scene, or of a material on a ball.
 
-    Without -o, the picture is written to the current folder under the name that the scene gives it.
-    Ctrl-C ends the render after the current pass (about half a second) and writes the picture so far; a second Ctrl-C
-    ends it at once. SIGTERM and SIGHUP do the same. A render that takes over a minute stores a checkpoint next to the
-    picture. To continue from it, use `gonio resume` or run the same command again.
+    Without -o, the picture is written to the current folder under the file name specified in the scene.
+    Ctrl-C ends the render after the current pass (about half a second) and writes the current picture; a second Ctrl-C
+    ends it immediately. SIGTERM and SIGHUP have the same effect. A render that takes more than a minute stores a
+    checkpoint next to the picture. To continue from it, use `gonio resume` or run the same command again.
 
     \b
     Examples:
@@ -104,4 +104,4 @@ def _print(result: Result, exposure: Exposure) -> None:
         text += f"; {why}, {result.wanted_spp} spp were requested"
     print(text)
     if result.stopped and result.checkpoint is not None:
-        print(f"go on with: gonio resume {shlex.quote(str(result.checkpoint))}")
+        print(f"resume with: gonio resume {shlex.quote(str(result.checkpoint))}")

@@ -1,4 +1,4 @@
-"""`gonio report`."""
+"""The command `gonio report`."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ from .base import PICTURES, verb
 
 
 class Figures(Options):
-    """Figures listed on the command line, in addition to the picture of the scene."""
+    """Figures specified on the command line, in addition to the picture of the scene."""
 
     study: Annotated[
         list[str] | None,
         Option(
             "--study",
             metavar="NAME=V1,V2",
-            help="Values for a sheet of the scene; ';' separates a second NAME; repeatable.",
+            help="Contact sheet of the scene over a parameter, or over two, separated by ';'; repeatable.",
         ),
     ] = None
     plot: Annotated[
         list[str] | None,
-        Option("--plot", metavar="[KIND=]MODEL", help="Materials for a plot, separated by ';'; repeatable."),
+        Option("--plot", metavar="[KIND=]MODEL", help="Materials to plot, separated by ';'; repeatable."),
     ] = None
     bake: Annotated[
         list[str] | None,
-        Option("--bake", metavar="TARGET", help="Distribution whose albedo tables are added, such as ggx; repeatable."),
+        Option(
+            "--bake", metavar="TARGET", help="Distribution, such as ggx, whose albedo tables are added; repeatable."
+        ),
     ] = None
     work: Annotated[
         list[str] | None,
@@ -49,15 +51,15 @@ def report(
     executor: Executor,
     title: Annotated[str, Option(metavar="TEXT", help="Heading of a new report.md.")] = "",
     pdf: Annotated[
-        bool, Option("--pdf", help="Also print the page to report.pdf, with an installed Chromium, Chrome or Edge.")
+        bool, Option("--pdf", help="Also print the page to report.pdf; requires Chromium, Chrome or Edge.")
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Write a lab report: pictures, sheets, plots, tables and verdicts in one document, with text that you edit.
+    """Create a lab report from pictures, contact sheets, plots, tables, verdicts and text of your own.
 
-    The folder contains report.md with the text, report.html (a single file that needs no network), and the figures.
-    report.md is written only if it is missing: edit its text and run the same command again. Figures that have not
-    changed are not created again.
+    The report's folder contains report.md with the text, report.html (a single file that needs no network), and the
+    figures. report.md is written only if it is missing: edit its text and run the same command again. Figures that have
+    not changed are not created again.
 
     \b
     Examples:
@@ -79,9 +81,9 @@ def report(
         return
     print_warnings(result.warnings)
     made = len(result.figures) - result.unchanged
-    print(f"{result.output}  {made} figures made, {result.unchanged} unchanged")
+    print(f"{result.output}  {made} figures created, {result.unchanged} unchanged")
     if result.pdf is not None:
         print(result.pdf)
-    print(f"{result.words}  {'edit the words, then run the same command again' if result.new_words else 'not changed'}")
+    print(f"{result.words}  {'edit the text, then run the same command again' if result.new_words else 'not changed'}")
     for line in result.unused:
         print(f"  not shown there: {line}")

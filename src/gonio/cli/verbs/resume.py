@@ -1,4 +1,4 @@
-"""`gonio resume`."""
+"""The command `gonio resume`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def resume(
     checkpoint: Annotated[Path, Argument(metavar="FILE", help="Checkpoint written by `gonio render`.")],
     *,
     output: Annotated[
-        Path | None, output_option("FILE", "File for the picture; by default that of the render.")
+        Path | None, output_option("FILE", "File for the picture; by default, that of the original render.")
     ] = None,
     spp: Spp = None,
     timeout: Timeout = None,
@@ -29,9 +29,9 @@ def resume(
 ) -> None:
     """Continue a render from its checkpoint, after an interruption or to add samples.
 
-    The picture is bit-identical to that of an uninterrupted render. --spp gives the total number of samples. A
-    checkpoint is rejected if its scene, files, settings, device or version have changed. Without -o, the picture is
-    written to the path that the checkpoint states if this path is in the checkpoint's folder, and next to the
+    The picture is bit-identical to that of an uninterrupted render. --spp sets the total number of samples. A
+    checkpoint is rejected if the scene, its files, the settings, the device or the version has changed. Without -o, the
+    picture is written to the path stored in the checkpoint if this path is in the checkpoint's folder, and next to the
     checkpoint otherwise.
 
     \b

@@ -1,4 +1,4 @@
-"""`gonio schema`."""
+"""The command `gonio schema`."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ def schema(
     kind: Annotated[
         str,
         Argument(
-            metavar="scene|report|manifest", help="Schema to print: of scene files, reports, or manifests of shaders."
+            metavar="scene|report|manifest",
+            help="Kind of file that the schema describes: scene, report, or shader manifest.",
         ),
     ] = "scene",
     output: Annotated[
         Path | None, output_option("FILE", "File for the schema; by default, the schema is printed.")
     ] = None,
 ) -> None:
-    """Print the JSON Schema of scene files, reports or manifests, for completion in editors and for validation.
+    """Print the JSON Schema of scene files, reports or shader manifests, for validation and for completion in editors.
 
     \b
     Examples:

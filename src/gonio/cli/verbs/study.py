@@ -1,4 +1,4 @@
-"""`gonio study`."""
+"""The command `gonio study`."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def study(
 ) -> None:
     """Compare parameter values: render a scene with each value, and arrange the pictures on one labeled sheet.
 
-    One --vary gives a row, two give a grid (the first varies down, the second across), and more give several grids. A
-    path denotes a value in the scene, or a parameter of a material, such as p or base.alpha. Several paths in one
-    --vary change together, for example with a constant sum: kd,ks=(0.05,0.25),(0.15,0.15).
+    One --vary gives a row, two give a grid (the first varies from top to bottom, the second from left to right), and
+    more give several grids. A path denotes a value in the scene, or a parameter of a material, such as p or base.alpha.
+    Several paths in one --vary change together, for example with a constant sum: kd,ks=(0.05,0.25),(0.15,0.15).
 
     \b
     Examples:

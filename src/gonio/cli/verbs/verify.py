@@ -1,4 +1,4 @@
-"""`gonio verify`."""
+"""The command `gonio verify`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Files(Options):
     junit: Annotated[Path | None, Option("--junit", metavar="FILE", help="JUnit XML file for the verdicts.")] = None
     sarif: Annotated[Path | None, Option("--sarif", metavar="FILE", help="SARIF 2.1.0 file for the failures.")] = None
     github: Annotated[
-        bool, Option("--github", help="Print annotations for GitHub Actions; on by default on its runners.")
+        bool, Option("--github", help="Print annotations for GitHub Actions; the default on GitHub runners.")
     ] = False
     baseline: Annotated[
         Path | None,
@@ -40,23 +40,24 @@ class Files(Options):
     ] = None
     write_baseline: Annotated[
         Path | None,
-        Option("--write-baseline", metavar="FILE", help="File to write the failures to, as a baseline for later runs."),
+        Option("--write-baseline", metavar="FILE", help="File for the failures, as a baseline for later runs."),
     ] = None
     tolerate: Annotated[
-        str, Option(metavar="GRADE", help="Severest grade of failures that pass: invisible, small or visible.")
+        str, Option(metavar="GRADE", help="Most severe grade of failures to tolerate: invisible, small or visible.")
     ] = ""
 
 
 class Effort(Options):
-    """Options that select the laws to test, and the effort."""
+    """Options that select the laws to test and the effort of the tests."""
 
     vary: Annotated[
         str,
         Option(
-            metavar="NAME=V1,V2|A..B", help="Parameter and its values, one report card per value; a range gives five."
+            metavar="NAME=V1,V2|A..B",
+            help="Parameter and its values (a range gives five); each value has its own report card.",
         ),
     ] = ""
-    quick: Annotated[bool, Option("--quick", help="Run a quick test, in seconds.")] = False
+    quick: Annotated[bool, Option("--quick", help="Run a quick test, which takes only seconds.")] = False
     deep: Annotated[bool, Option("--deep", help="Test with more samples, directions and roughnesses.")] = False
     seed: Seed = None
     law: Annotated[
@@ -88,7 +89,7 @@ def verify(
         Argument(
             metavar="TARGET",
             help="MODEL, FILE.py:CLASS, a shader such as FILE.glsl, mitsuba:PLUGIN, or a Mitsuba .xml or .json; "
-            "several are verified with the same options.",
+            "several targets share the same options.",
             autocompletion=completion.materials,
         ),
     ],
@@ -97,16 +98,17 @@ def verify(
     made: Material,
     how: Effort,
     at: Annotated[
-        str, Option(metavar="O/I", help="Pair of directions to evaluate in both orders: theta,phi/theta,phi, degrees.")
+        str,
+        Option(metavar="O/I", help="Pair of directions to evaluate in both orders: theta,phi/theta,phi in degrees."),
     ] = "",
     executor: Executor,
     as_json: Json = False,
 ) -> None:
-    """Verify BSDFs: energy conservation, reciprocity, sampling, gradients and precision.
+    """Verify the energy conservation, reciprocity, sampling, gradients and precision of BSDFs.
 
-    Each target is tested in a separate process, so a BSDF that crashes or does not return does not stop the test. The
-    exit code is 1 if a target violates a law without declaring the violation, or 4 if all such violations are too small
-    to be visible in a picture.
+    Each target is tested in a separate process, so a BSDF that crashes or hangs does not end the run. The exit code is
+    1 if a target violates a law without declaring the violation, or 4 if all such violations are too small to be
+    visible in a picture.
 
     \b
     Examples:
@@ -122,7 +124,7 @@ def verify(
     if at:
         _show_pairs(target, made.settings(), how.vary, at, as_json)
         return
-    # Import nothing heavy before the first process has started, which takes as long as everything else together.
+    # Import only small modules before the first process has started, which takes as long as all other steps together.
     from ...verify.ci.outputs import Outputs
     from ...verify.isolation import child
 
@@ -149,7 +151,8 @@ def _judge(task: Task, title: str, how: Effort, executor: Executor, *, quiet: bo
     from ...verify.isolation import child
 
     with _progress(title) as (progress, tell):
-        # A single target or a quick check has nothing to resume, so processes divide its cards without a cluster.
+        # A single target or a quick check need not be resumable, so its cards are divided among processes without a
+        # cluster.
         if executor.cluster is None and (len(task.items) == 1 or task.effort == "quick"):
             workers = 1 if executor.workers is None else executor.workers
             shown = None if quiet else tell
@@ -162,8 +165,8 @@ def _judge(task: Task, title: str, how: Effort, executor: Executor, *, quiet: bo
 
 @contextlib.contextmanager
 def _progress(title: str) -> Iterator[tuple[Callable[[int, int, str], None], Callable[[str], None]]]:
-    """Two functions: one updates a progress bar, created at the first step since it loads Rich; one prints lines above
-    it. Both write to standard error."""
+    """Two functions that write to standard error: one updates a progress bar, which is created at the first step
+    because it loads Rich; the other prints lines above the bar."""
     with contextlib.ExitStack() as stack:
         bars: list[Bar] = []
 

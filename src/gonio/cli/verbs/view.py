@@ -1,4 +1,4 @@
-"""`gonio view`."""
+"""The command `gonio view`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def view(
         list[str] | None,
         Argument(
             metavar="SCENE|MODEL",
-            help="Lab scene, or materials; by default gold with and without Kulla-Conty.",
+            help="Scene, or materials; by default, gold with and without Kulla-Conty.",
             autocompletion=completion.materials,
         ),
     ] = None,
@@ -57,9 +57,9 @@ def view(
     trust: Trust,
     as_json: Json = False,
 ) -> None:
-    """Show materials on shading balls in a browser, interactively, next to a path-traced reference.
+    """Show materials interactively in a browser, on shading balls and next to a path-traced reference.
 
-    The files of FILE.py:CLASS and of shaders (FILE.glsl) are watched: when a file is saved, the page shows the new
+    Python files (FILE.py:CLASS) and shaders (FILE.glsl) are watched: when a file is saved, the page shows the new
     picture, or the error in the file. With -o, the page is a single file that needs no server and no network.
 
     \b
@@ -87,7 +87,7 @@ def view(
 
 
 def _homework(target: Sequence[str] | None, made: Material) -> Stage:
-    """The rows of the homework. Raises InputError if anything else is named."""
+    """The rows of the homework. Raises InputError if a target or a parameter is given."""
     from ...viewer import stage
 
     made.shaders(())
@@ -98,7 +98,7 @@ def _homework(target: Sequence[str] | None, made: Material) -> Stage:
 
 
 def _stage(target: Sequence[str], made: Material, trust: Trust) -> Stage:
-    """The stage of a scene or of materials, or the default one if nothing is named."""
+    """The stage of a scene or of materials, or the default stage if no target is given."""
     from ...catalog import operands
     from ...viewer import stage
 

@@ -1,5 +1,5 @@
-"""A cell of adaptive cubature: Gauss-Legendre nodes inside, and points at the cell's rim, which detect steps between
-them."""
+"""A cell of adaptive cubature: Gauss-Legendre nodes inside the cell, and points at its rim, which detect
+discontinuities between the nodes and the rim."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from ...optics.special import gauss
 
-UNSEEN = 0.25  # below this fraction of a sample's density, the values at a cell's nodes have missed its lobe
-FAINT = 0.01  # fraction of the missed light: nodes that show less do so by chance, and show nothing in the next cell
+UNSEEN = 0.25  # fraction of a sample's density; if all nodes of its cell are below it, they have missed a lobe
+FAINT = 0.01  # fraction of the missed light: nodes detect less only by chance, and nothing in the next cell
 OUTSIDE = 0.07  # distance of the first of four nodes from the rim, as a fraction of a cell's width
 
 
@@ -23,7 +23,7 @@ class Nodes(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """The integrand in cells.
+    """Values of the integrand in cells.
 
     integral     weighted sum over the nodes, (cells, ...)
     least, most  smallest and largest value at the nodes, (cells,)
@@ -38,7 +38,7 @@ class Points(NamedTuple):
     """Samples inside cells, which reveal lobes that are narrower than a cell.
 
     cell     index of each sample's cell, (N,)
-    at       its two coordinates, (N, 2)
+    at       the two coordinates of each sample, (N, 2)
     density  the integrand per unit area in these coordinates, (N,)
     light    contribution of the sample to an estimate of the integral, (N,)
     """
@@ -57,8 +57,8 @@ class Points(NamedTuple):
         return np.bincount(self.cell, self.light, count)
 
     def missed_by(self, area: np.ndarray, most: np.ndarray) -> np.ndarray:
-        """An estimate of the light that the nodes of each cell miss, (cells,), if a sample in the cell is bright and
-        all nodes are dark; else 0.
+        """An estimate of the light that the nodes of each cell miss, (cells,); 0 unless a sample in the cell is bright
+        and all nodes are dark.
 
         area  area of each cell
         most  largest density at the nodes of each cell, times its area
@@ -85,7 +85,7 @@ def rim(inset: float) -> Nodes:
 
 
 def rimmed(inset: float) -> Nodes:
-    """A rule of four nodes per direction that is exact to degree 5, like Lobatto's, with the outer nodes at a fraction
+    """A rule with four nodes per direction that is exact to degree 5, like Lobatto's; its outer nodes are at a fraction
     `inset` of the width from the rim. It detects a step between the rim and the first node of a Gauss rule, which the
     Gauss rules miss."""
     outer = (1.0 - 2.0 * inset) ** 2
@@ -98,9 +98,9 @@ def rimmed(inset: float) -> Nodes:
 
 
 def step_aside(inside: Seen, rim: Seen, times: float = 4.0) -> np.ndarray:
-    """A bound on the integral missed between nodes and rim, (cells,), if values at the rim differ strongly from those
-    at the nodes. No rule resolves a step there, such as the horizon or the critical angle. The bound has the unit of
-    `least` and `most`.
+    """A bound on the part of the integral that is missed between the nodes and the rim, (cells,), if values at the rim
+    differ strongly from those at the nodes. No rule resolves a step there, such as the horizon or the critical angle.
+    The bound has the unit of `least` and `most`.
 
     times  ratio of the values above which a difference is not explained by the slope within the cell
     """

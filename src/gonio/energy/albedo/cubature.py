@@ -1,10 +1,10 @@
 """Integrals over the sphere of wi, for many wo at once, by adaptive cubature.
 
-A cell is a rectangle in (theta, phi), theta measured from the nearer pole, so no cell crosses the horizon. Cells are
-first divided where the model's samples are dense and around the mirror direction, so that a lobe of a thousandth of a
-radian is resolved. Then they are divided wherever a cell's Gauss-Legendre value differs from the sum over its quarters,
-until the error of the integral, which follows from these differences, is below the tolerance. The differences are
-errors of the coarser values, so the reported error is conservative.
+A cell is a rectangle in (theta, phi), where theta is measured from the nearer pole, so that no cell crosses the
+horizon. Cells are first divided where the model's samples are dense and around the mirror direction, so that a lobe
+with a width of a thousandth of a radian is resolved. Then cells are divided wherever the Gauss-Legendre value of a cell
+differs from the sum over its quarters, until the error of the integral, which follows from these differences, is below
+the tolerance. The differences are errors of the coarser values, so the reported error is conservative.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ import numpy as np
 from ...ops import Direction, Scalar, backend
 from .cells import FAINT, Nodes, Points, Seen, product, rimmed, step_aside
 
-ORDER = 4  # nodes per side: exact for polynomials of degree 7, and cheap compared with dividing a cell
+ORDER = 4  # nodes per side of a cell: exact for polynomials of degree 7, and less expensive than dividing the cell
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
 FIRST = (8, 16)  # cells per side of the surface, in theta and phi
 FIRST_SIZE = np.array([0.5, 2.0]) * np.pi / FIRST
 DEPTH = 21  # halvings of pi/16, down to 1e-7: at 89.9 degrees, a lobe of width 2e-4 is that narrow
-SEEDED = 17  # halvings around samples
-SAMPLES = (1 << 10, 1 << 13, 1 << 16)  # per wo; more if the smaller number leaves light unseen
+SEEDED = 17  # maximum number of halvings around samples
+SAMPLES = (1 << 10, 1 << 13, 1 << 16)  # samples per wo; the larger numbers are used if the smaller ones miss light
 CROWD = 1 / 32  # fraction of the samples in a cell above which it is divided before the integrand is evaluated
-BUDGET = 0.5  # fraction of the tolerance: an integral with a smaller error is done
+BUDGET = 0.5  # fraction of the tolerance; an integral is finished once its error is smaller
 OFF = 1e-3  # difference from unit length above which a sampled direction is not used
 UP = np.array([0.0, 0.0, 1.0])
 MAX_CELLS = 600_000  # cells evaluated per round, about 10 M directions
@@ -33,14 +33,14 @@ MAX_CELLS = 600_000  # cells evaluated per round, about 10 M directions
 
 _GAUSS, _RIMMED = product(ORDER), rimmed(1e-3)
 
-Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # of 64-bit Dr.Jit vectors
+Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # function of float64 Dr.Jit vectors
 # (wo, u), (N, 3) each, -> a Sample of arrays; determines where cells are divided first
 Sampler: TypeAlias = Callable[[np.ndarray, np.ndarray], Any]
 
 
 def of_rows(function: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Integrand:
-    """The integrand for a function of NumPy arrays, (N, 3) and (N, 3) -> (N, channels); about ten times slower than one
-    of Dr.Jit vectors."""
+    """The integrand for a function of NumPy arrays, (N, 3) and (N, 3) -> (N, channels); about ten times slower than a
+    function of Dr.Jit vectors."""
     types = backend.types("float64")
 
     def integrand(wo: Direction, wi: Direction) -> list[Scalar]:
@@ -55,7 +55,7 @@ def of_rows(function: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Integra
 QUADRANTS, ALONG_THETA, ALONG_PHI = 0, 1, 2
 WAYS = np.array([(2, 2), (4, 1), (1, 4)])
 PLACES = np.array([[(0, 0), (1, 0), (0, 1), (1, 1)], [(k, 0) for k in range(4)], [(0, k) for k in range(4)]])
-ONE_WAY = 0.05  # ratio of the ranges of values along the two coordinates below which only one of them is divided
+ONE_WAY = 0.05  # if the values vary along one coordinate by less than this fraction of the other, only that is divided
 
 
 class Integral(NamedTuple):
@@ -108,12 +108,13 @@ def integrate(
 ) -> Integral:
     """int integrand(wo, wi) dwi over the sphere, for each row of wo (N, 3).
 
-    sample     the `sample` method of the model, which shows where its lobes are
+    sample     the `sample` method of the model, which reveals its lobes
     integrand  function of float64 Dr.Jit vectors wo and wi that returns one value per channel; it runs inside a kernel
     tolerance  absolute error of an integral up to 1, relative error of a larger one; if cells or samples run out, the
                reported error is larger
     seed       seed of the samples
-    attempts   numbers of `SAMPLES` that are tried; with fewer, the reported error contains the light that is unseen
+    attempts   how many of the numbers in `SAMPLES` are tried; light that remains undetected is part of the reported
+               error
     """
     per, *more = SAMPLES[:attempts]
     value, error, unseen = _integrate(sample, integrand, wo, tolerance, seed, per)
@@ -128,34 +129,35 @@ def integrate(
 def _integrate(
     sample: Sampler, integrand: Integrand, wo: np.ndarray, tolerance: float, seed: int, per: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values and errors of integrals whose first cells follow `per` samples of each wo, and an estimate, (N,), of the
-    light in lobes that are narrower than the cells and that no sample has hit.
+    """Values and errors of integrals whose first cells are derived from `per` samples for each wo, and an estimate,
+    (N,), of the light in lobes that are narrower than the cells and that no sample has hit.
 
-    Along a streak that is a thousand times as long as wide, a cell between two samples is as dark at its nodes as one
-    beside the streak. The remaining light is estimated by the light of samples that are the only ones in a cell and
-    caused its division (Good1953: if N_1 of N draws are the only ones of their kind, unseen kinds have the probability
-    N_1 / N).
+    Along a streak that is a thousand times as long as wide, a cell between two samples is as dark at its nodes as a
+    cell next to the streak. The missing light is estimated by the light of the samples that are the only ones in their
+    cell and caused its division (Good1953: if N_1 of N draws are the only ones of their kind, kinds not yet seen have
+    the probability N_1 / N).
     """
     cells, points = _seeded(sample, integrand, wo, seed, per)
     (first,), way = _values(integrand, wo, cells, _GAUSS)
     way[points.missed_by(cells.area, first.most) > 0.0] = QUADRANTS
     coarse = first.integral
     channels = coarse.shape[1]
-    unseen, shown = np.zeros(len(wo)), np.zeros(len(cells.row), bool)  # shown by a single sample
+    unseen, shown = np.zeros(len(wo)), np.zeros(len(cells.row), bool)  # lobe revealed by a single sample
     value, errors = np.zeros((len(wo), channels)), _Errors(len(wo), channels)
     for depth in range(DEPTH):
         fine_cells = cells.quarters(way)
         (inner, other), ways = _values(integrand, wo, fine_cells, _GAUSS, _RIMMED)
         fine = _joined(inner.integral)
         so_far = [value + _by_row(cells.row, part, len(wo)) for part in (coarse, fine)]
-        # a gain of a thousand need not be known to 1e-5; a light that one of the two rules hits by chance is no gain
+        # an integral of a thousand does not need an accuracy of 1e-5; light that only one of the two rules hits does
+        # not count
         scale = np.maximum(np.minimum(*[np.abs(total).max(1) for total in so_far]), 1.0)
-        allowed = (tolerance / 400.0 * scale)[cells.row]  # some hundreds of cells contribute to an integral's error
-        # a step shared by many cells, such as the rim of a cone about the normal, may mislead one rule in all of them,
-        # and all of Gauss's rules if it is near their rim
+        allowed = (tolerance / 400.0 * scale)[cells.row]  # several hundred cells contribute to the error
+        # a step that crosses many cells, such as the rim of a cone about the normal, may cause the same error of a rule
+        # in all of them, and in all Gauss rules if the step is close to the rims of the cells
         signed = np.stack([coarse, _joined(other.integral)]) - fine
         difference = np.maximum(*np.abs(signed))
-        difference += 0.02 * _joined(step_aside(inner, other)[:, None])  # errors of steps partly cancel
+        difference += 0.02 * _joined(step_aside(inner, other)[:, None])  # errors at steps cancel in part
         small = errors.with_cells(cells.row, signed, difference).total().max(1) < BUDGET * tolerance * scale
         divide = (difference.max(1) > allowed) & ~small[cells.row]
         missed = points.missed_by(cells.area, 4.0 * inner.most.reshape(-1, 4).max(1))
@@ -183,7 +185,7 @@ def _integrate(
 
 
 def _joined(quarters: np.ndarray) -> np.ndarray:
-    """The sums (M, C) of values (4 M, C) over the four quarters of each cell, ten times as fast as by `sum`."""
+    """The sums (M, C) of values (4 M, C) over the four quarters of each cell, ten times as fast as with `sum`."""
     return quarters[0::4] + quarters[1::4] + quarters[2::4] + quarters[3::4]
 
 
@@ -195,9 +197,9 @@ def _by_row(row: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
 class _Errors:
     """The errors of the cells that are not divided, summed per integral and channel, (N, C).
 
-    Along the edge of a step, the errors of cells have either sign and mostly cancel, so the estimate contains three
-    standard errors of their sum. If the edge is parallel to the cells, it affects all of them alike, so the estimate
-    also contains the sum itself, for the rule that gives the larger one.
+    Along a discontinuity, the errors of the cells have both signs and mostly cancel, so the estimate contains three
+    standard errors of their sum. If the discontinuity is parallel to the edges of the cells, it causes the same error
+    in all of them, so the estimate also contains the sum itself, from the rule for which it is larger.
     """
 
     def __init__(self, count: int, channels: int) -> None:
@@ -205,7 +207,7 @@ class _Errors:
         self.squares = np.zeros((count, channels))
 
     def with_cells(self, row: np.ndarray, signed: np.ndarray, size: np.ndarray) -> _Errors:
-        """The sums with M more cells.
+        """The sums after M more cells have been added.
 
         row     index of wo, (M,)
         signed  differences of the two rules, (2, M, C)
@@ -234,8 +236,8 @@ def _within(points: Points, cells: _Cells, divided: np.ndarray, way: np.ndarray)
 
 
 def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, per: int) -> tuple[_Cells, Points]:
-    """The initial cells, divided around the mirror direction, wo and those of `per` samples for each wo that carry
-    light; and these samples in the cells."""
+    """The initial cells, which are divided around the mirror direction, around wo, and around those of `per` samples
+    for each wo that carry light; and these samples in the cells."""
     n_theta, n_phi = FIRST
     corner = np.stack(np.meshgrid(np.arange(n_theta), np.arange(n_phi), indexing="ij"), -1).reshape(-1, 2) * FIRST_SIZE
     row, side, cell = np.meshgrid(np.arange(len(wo)), [1.0, -1.0], np.arange(len(corner)), indexing="ij")
@@ -255,12 +257,12 @@ def _seeded(sample: Sampler, integrand: Integrand, wo: np.ndarray, seed: int, pe
          np.arctan2(likely[:, 1], likely[:, 0]) % (2.0 * np.pi)], -1
     )  # fmt: skip
     below = (likely[:, 2] < 0.0).astype(int)
-    crowd = np.where(np.arange(len(likely)) < len(value), 1.0, CROWD * per)  # a single marker divides its cell
+    crowd = np.where(np.arange(len(likely)) < len(value), 1.0, CROWD * per)  # each other direction divides its cell
     homes, first = np.zeros(len(likely), int), 0
     left = np.arange(len(likely))  # points in cells that are not accepted yet
     accepted: list[_Cells] = []
     for level in range(SEEDED):
-        # one integer identifies a point's cell: row, side, and the cell's two coordinates
+        # one integer identifies the cell of a point: row, side, and the two coordinates of the cell
         most = np.array(FIRST) * 2**level
         point = _key(owner[left], below[left], angles[left] / FIRST_SIZE * 2**level, most)
         mine = _key(cells.row, (cells.side < 0).astype(int), np.round(cells.low / cells.size), most)
@@ -296,8 +298,8 @@ def _key(row: np.ndarray, below: np.ndarray, at: np.ndarray, most: np.ndarray) -
 
 
 def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) -> tuple[list[Seen], np.ndarray]:
-    """The integrand at the nodes of every cell, for each of several rules with ORDER^2 nodes, evaluated in one kernel;
-    and the way to divide each cell, by the first rule."""
+    """The values of the integrand at the nodes of every cell, for each of several rules with ORDER^2 nodes, evaluated
+    in one kernel; and the way to divide each cell, according to the first rule."""
     dr = backend.drjit()
     types = backend.types("float64")
     nodes = [backend.float_of(np.concatenate(column), types) for column in zip(*rules, strict=True)]
@@ -323,10 +325,10 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, *rules: Nodes) 
         area = sin * width * height
         weighed = [channel * (area * weight) for channel in value]
         summed = sum(value[1:], start=value[0]) * area
-        dr.eval(weighed, summed)  # together: each reduction would evaluate the integrand again
+        dr.eval(weighed, summed)  # in one call, because each reduction would otherwise evaluate the integrand again
         sums = [dr.block_sum(channel, each) for channel in weighed]
         ends = [dr.block_reduce(op, summed, each) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
-        # nodes are in rows of equal theta; a range along theta needs columns
+        # nodes are stored in rows of equal theta; the range along theta requires columns
         columns_first = dr.gather(
             types.float, summed, index - index % each + index % ORDER * ORDER + index % each // ORDER
         )

@@ -3,10 +3,10 @@
     albedo(wo) = int f*(wo, wi) |cos theta_i| dwi        over both sides of the surface
 
 f* is the BSDF without the radiance factor (eta_o/eta_i)^2 (mode "importance"), so that reflected and transmitted power
-add up; 1 means no absorption.
+can be added; an albedo of 1 means no absorption.
 
 There are three methods, from most to least accurate:
-    closed form  stated by the material itself (`BSDF.known_albedo`): Lambert, mirrors, smooth glass, mixtures of them
+    closed form  provided by the material itself (`BSDF.known_albedo`): Lambert, mirrors, smooth glass, mixtures of them
     quadrature   for microfacet models by `quadrature`; for any other `eval` by `cubature`, guided by `sample`
     sampling     mean weight of `sample` over randomly shifted lattices, with the standard error over the shifts
 """
@@ -70,9 +70,9 @@ def albedo(
     method   "auto" selects the first of "closed-form", "quadrature" and "sampling" that supports the material
     samples  total number of samples per direction, for "sampling"
     seed     seed of the samples
-    Returns an `Albedo`. The error of a quadrature is its difference from a finer or coarser one, that of sampling is
-    one standard error.
-    Raises InputError if the method does not support the material, or if a parameter has one value per ray.
+    Returns an `Albedo`. The error of a quadrature is its difference from a finer or coarser quadrature; the error of
+    sampling is one standard error. Raises InputError if the method does not support the material, or if a parameter has
+    one value per ray.
     """
     if not isinstance(model, BSDF):
         raise InputError(f"{type(model).__name__} given, a material expected", "albedo")
@@ -121,16 +121,16 @@ def check_uniform(model: BSDF) -> None:
 
 # --------------------------------------------------------------------------- closed forms and quadrature
 
-NODES, JUDGE = 64, 96  # for quadratures that a material performs itself, and for those that estimate their error
+NODES, JUDGE = 64, 96  # nodes of the quadratures that a material performs itself, and of those that estimate the error
 
 
 def known(
     model: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64], nodes: int | None
 ) -> NDArray[np.float64] | None:
-    """The albedo stated by the material itself, or computed by quadrature over its microsurface; None if neither is
+    """The albedo that the material itself provides, or its quadrature over the microsurface; None if neither is
     possible.
 
-    nodes  number of nodes for quadratures; None allows closed forms only
+    nodes  number of quadrature nodes; None allows only closed forms
     """
 
     def inner(material: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -143,7 +143,7 @@ def known(
 
 
 def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> NDArray[np.float64] | None:
-    """The albedo by quadrature over the normals of the facets; None without a rough microsurface."""
+    """The albedo by quadrature over the normals of the facets; None if the material has no rough microsurface."""
     surface = model.microsurface
     if surface is None or min(widths(surface.alpha)) < SMOOTH:
         return None
@@ -174,12 +174,12 @@ def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> N
 
 
 def widths(alpha: object) -> tuple[float, float]:
-    """The two widths (alpha_x, alpha_y) as plain numbers."""
+    """The two alphas (alpha_x, alpha_y) as plain numbers."""
     x, y = pair_of(alpha)
     return float(x), float(y)
 
 
-# --------------------------------------------------------------------------- any eval
+# --------------------------------------------------------------------------- any other material
 
 TOLERANCE = 1e-6
 
@@ -198,7 +198,7 @@ SHIFTS = 16
 
 
 def _by_sampling(model: BSDF, mu: np.ndarray, phi: np.ndarray, samples: int, seed: int) -> Albedo:
-    """Mean weight over SHIFTS randomly shifted lattices."""
+    """The mean weight over SHIFTS randomly shifted lattices."""
     if samples < SHIFTS:
         raise InputError(f"{samples} samples given", "albedo: samples", f"give {SHIFTS} or more")
     count = samples // SHIFTS

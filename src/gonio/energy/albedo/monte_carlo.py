@@ -1,8 +1,8 @@
 """E(mu, alpha) by Monte Carlo integration, as in student implementations, for comparison with the quadrature.
 
-The methods of sampling are:
+The sampling methods are:
 cosine   cosine-weighted wi; the weight is f pi. Unbiased, but narrow lobes are rarely hit: below roughness 0.3, most
-         texels with 1024 samples are far too small
+         texels are far too dark with 1024 samples
 ggx, beckmann, ... (the distribution's name)   normals with density D(m) m.n; the weight is (o.m) G / ((o.n) (m.n))
 visible  visible normals; the weight is G / G1(o), at most 1 (Heitz2014b)
 """
@@ -54,11 +54,12 @@ class Sampling(NamedTuple):
 
     method  "cosine", the distribution's name or "visible"; for a table also "quadrature", without samples
     spp     number of samples per texel, 1 or more
-    points  "hammersley" uses the same points for every texel, as in the homework; "independent" uses new ones for each;
-            "stratified" uses new ones for each, one in each cell of a square grid, so `spp` must be a square
+    points  "hammersley" uses the same points for every texel, as in the homework; "independent" uses new points for
+            each; "stratified" uses new points for each, one in each cell of a square grid, so `spp` must be a square
+            number
     seed    seed of the points, if they are random
-    floor   lower bound of the denominator of D in method "cosine", as in the homework's program: D is then at most
-            alpha_x alpha_y / floor; 0 for no bound
+    floor   lower bound of the denominator of D in the method "cosine", as in the homework's program: D is then at most
+            alpha_x alpha_y / floor; 0 means no bound
     """
 
     method: str
@@ -69,7 +70,7 @@ class Sampling(NamedTuple):
 
 
 def estimate(ndf: str, masking_name: str, at: Points, sampling: Sampling, precision: Precision = "float32") -> Estimate:
-    """E from random samples.
+    """Estimate E from random samples.
 
     at         the points (mu, alpha, alpha_y, phi) at which E is estimated
     sampling   method and number of samples
@@ -112,14 +113,14 @@ def estimate(ndf: str, masking_name: str, at: Points, sampling: Sampling, precis
         body=body,
         labels=("i", "total", "squares", "rng"),
     )
-    dr.eval(total, squares)  # together: each by itself would run the loop
+    dr.eval(total, squares)  # in one call, because each would otherwise run the loop
     mean = np.asarray(total.numpy(), float) / spp
     variance = np.maximum(np.asarray(squares.numpy(), float) / spp - mean**2, 0.0)
     return Estimate(mean.reshape(shape), np.sqrt(variance / spp).reshape(shape))
 
 
 def _check(ndf: str, method: str, points: str, spp: int) -> None:
-    """Raise InputError for unknown names and for numbers of samples that are not possible."""
+    """Raise InputError for unknown names and for invalid numbers of samples."""
     if method not in methods(ndf):
         raise InputError(f"unknown method '{method}'", "method", did_you_mean(method, [*methods(ndf), "quadrature"]))
     if points not in POINTS:
@@ -135,7 +136,7 @@ def _check(ndf: str, method: str, points: str, spp: int) -> None:
 def _weight(
     ndf: NDF, masking_name: str, method: str, wo: Array, widths: Array, u1: Array, u2: Array, bound: Array | None
 ) -> Array:
-    """f cos / pdf of one sample at F = 1; `bound` is the largest D in method "cosine"."""
+    """f cos / pdf of one sample at F = 1; `bound` is the largest D in the method "cosine"."""
     dr = backend.drjit()
     if method == "cosine":
         wi = warp.square_to_cosine_hemisphere(u1, u2)

@@ -1,28 +1,30 @@
-"""The quadrature rule for integrals over the normals of microfacets: its variables, and the places where it is split.
+"""The quadrature rule for integrals over the normals of microfacets: its variables, and the points where it is split.
 
-**The boundary.** In the plane of n and m, a reflection doubles angles. The projection of o onto this plane makes the
-angle delta = atan(tan(theta_o) cos(phi_m)) with n, phi_m measured from o; that of i makes 2 theta_m - delta, so i is
-above the surface exactly if theta_m < pi/4 + delta / 2. Such an m has o.m > 0 as well. Inside the boundary the
-integrand is smooth, so Gauss-Legendre nodes on an interval that ends there converge geometrically.
+**The boundary.** In the plane of n and m, a reflection doubles angles. The projection of o onto this plane is at the
+angle delta = atan(tan(theta_o) cos(phi_m)) to n, where phi_m is measured from o; the projection of i is at the angle
+2 theta_m - delta, so i is above the surface if and only if theta_m < pi/4 + delta / 2. For such an m, o.m > 0 as
+well. Inside the boundary, the integrand is smooth, so a Gauss-Legendre rule on an interval that ends there converges
+geometrically.
 
 **The variables.** Normals are expressed by their stretched slopes, tan(theta_m) (cos phi_m, sin phi_m) =
 t (alpha_x cos b, alpha_y sin b), so that dm = alpha_x alpha_y cos^3(theta_m) t dt db. Then
 
-  - o.m / (mu cos(theta_m)) = 1 + (S / mu) t cos(b - b_o), with S = |(alpha_x o_x, alpha_y o_y)| and b_o its angle:
-    anisotropy affects only the boundary and G;
+  - o.m / (mu cos(theta_m)) = 1 + (S / mu) t cos(b - b_o), where S is the length of (alpha_x o_x, alpha_y o_y) and b_o
+    its azimuth: anisotropy affects only the boundary and G;
   - t = sinh(x) assigns the same number of nodes to each octave of slope, from the peak through the long tail of GGX;
-  - across b - b_o = +-pi/2, the boundary jumps from theta_o's complement, small at grazing, to nearly pi/2, within an
-    angle of about w = mu |(alpha_x sin b_o, alpha_y cos b_o)| / S, which is cot(theta_o) for one width. With
-    b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and sinh(a) = (pi/2) / w, the jump takes as much of x as
-    the rest;
-  - where the azimuths of m and o are equal, the integrand has an edge at grazing angles. For one width, this is
-    b = b_o, the end of both half turns; for two widths, it is nearby, and the half turns are made to end there.
+  - across b - b_o = +-pi/2, the boundary jumps from the complement of theta_o, which is small at grazing angles, to
+    nearly pi/2, within an angle of about w = mu |(alpha_x sin b_o, alpha_y cos b_o)| / S, which is cot(theta_o) if the
+    alphas are equal. With b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and sinh(a) = (pi/2) / w, the jump
+    occupies as much of the range of x as all other angles;
+  - where the azimuths of m and o are equal, the integrand has a kink at grazing angles. If the alphas are equal, this
+    is at b = b_o, the end of both half turns; otherwise, it is nearby, and the half turns are chosen to end there.
 
-**Glass.** Reflection and transmission share the normals visible from o, theta_m < pi/2 + min(delta, 0). F has a
-square-root singularity at the critical angle, o.m = cos_c; along a stretched azimuth o.m = A cos(theta_m - delta), so
-it occurs at theta_m = delta +- acos(cos_c / A), where A = |cos delta|^-1 mu is the length of o's projection. The
-integral is split there and at the boundary of reflection; the azimuths are split where A = cos_c, beyond which there is
-no total reflection. Each piece is parametrized by s^2 (3 - 2 s), which makes a square root at either end smooth.
+**Glass.** The integrals for reflection and transmission are over the same normals, those visible from o:
+theta_m < pi/2 + min(delta, 0). F has a square-root singularity at the critical angle, o.m = cos_c; along a stretched
+azimuth, o.m = A cos(theta_m - delta), so it occurs at theta_m = delta +- acos(cos_c / A), where A = |cos delta|^-1 mu
+is the length of the projection of o. The integral is split there and at the boundary of reflection; the azimuths are
+split where A = cos_c, beyond which there is no total reflection. Each piece is parametrized by s^2 (3 - 2 s), in which
+a square root at either end is smooth.
 """
 
 from __future__ import annotations
@@ -44,13 +46,13 @@ SMALLEST_MU = 1e-6  # the integrand contains 1 / mu: the limit mu -> 0 is evalua
 SMALLEST_ALPHA = 1e-5
 
 
-# (distribution, wo, normal m, o.m, widths, eta) -> the integrands, without D
+# (distribution, wo, normal m, o.m, alphas, eta) -> the integrands, without D
 Integrand: TypeAlias = Callable[[NDF, Direction, Direction, Scalar, Pair, Array], tuple[Scalar, ...]]
 
 
 @lru_cache
 def longest_slope(ndf: NDF) -> float:
-    """The stretched slope t beyond which less than about 1e-9 of a distribution's normals lie."""
+    """The stretched slope t that less than about 1e-9 of a distribution's normals exceed."""
     t = np.logspace(-1, 8, 400)
     kind = backend.types("float64")
     c = 1.0 / np.hypot(1.0, t)
@@ -69,7 +71,7 @@ def over_azimuths(
 
     points   mu, alpha_x, alpha_y, phi and eta of each point
     nodes    numbers of nodes in azimuth and slope
-    sides    number of half turns to integrate: 1 if the two are equal, else 2
+    sides    number of half turns to integrate over: 1 if the two are equal, else 2
     through  whether to include all normals visible from o, as for glass
     """
     dr = backend.drjit()
@@ -90,12 +92,12 @@ def over_azimuths(
     sums = _over_slopes(ndf, terms, channels, view, eta, slope, _cuts(view, eta, slope, limit), n_slope)
     factor = weight * view.alpha.x * view.alpha.y / view.mu
     scaled = [total * factor for total in sums]
-    dr.eval(scaled)  # together: each reduction would run the loop again
+    dr.eval(scaled)  # in one call, because each reduction would otherwise run the loop again
     return [np.asarray((dr.block_sum(total, block) * (2.0 / sides)).numpy()) for total in scaled]
 
 
 class _View(NamedTuple):
-    """One direction o per lane.
+    """A direction o per lane, and derived values.
 
     sin_o           sine of the angle between o and the normal
     cos_bo, sin_bo  cosine and sine of the azimuth b_o of the stretched o
@@ -126,14 +128,14 @@ def _view(mu: Array, alpha: Array, phi: Array) -> _View:
 
 
 def _azimuth(view: _View, eta: Array | None, chi: Array, chi_weight: Array, side: Array) -> tuple[Array, Array]:
-    """The slope of the normals at t = 1, and the weight, of one stretched azimuth."""
+    """For one stretched azimuth, the slope of the normals at t = 1, and the weight."""
     dr = backend.drjit()
     wo, alpha, cos_bo, sin_bo = view.wo, view.alpha, view.cos_bo, view.sin_bo
-    # chi = (pi/2) sinh(a x) / sinh(a), x in [-1, 1]; the jump's width is limited to 1, where there is no jump
+    # chi = (pi/2) sinh(a x) / sinh(a), x in [-1, 1]; the width of the jump is limited to 1, at which there is no jump
     across = dr.norm(ops.vec2(alpha.x * sin_bo, alpha.y * cos_bo))
     leap = dr.minimum(view.mu * across / dr.maximum(view.length, 1e-9 * across), 1.0)
     a = _asinh(0.5 * ops.pi / leap)
-    # the edge at which the azimuths of m and o are equal is at the angle beta from b_o
+    # the kink at which the azimuths of m and o are equal is at the angle beta from b_o
     edge_x, edge_y = wo.x / alpha.x, wo.y / alpha.y
     beta = dr.atan2(edge_y * cos_bo - edge_x * sin_bo, edge_x * cos_bo + edge_y * sin_bo)
     beta = dr.select(view.length > 0.0, beta, 0.0)
@@ -152,7 +154,8 @@ def _azimuth(view: _View, eta: Array | None, chi: Array, chi_weight: Array, side
 
 
 def _glass_ends(view: _View, eta: Array, side: Array, leap: Array, a: Array, top: Array) -> list[Array]:
-    """The x, high and low, at which A = cos_c, that is, cos(phi_m - phi_o) = +-q; arbitrary cuts if there are none."""
+    """The values of x, high and low, at which A = cos_c, that is, cos(phi_m - phi_o) = +-q; arbitrary if there are
+    none."""
     dr = backend.drjit()
     cos_c = dr.sqrt(dr.maximum(1.0 - dr.square(eta), 0.0))
     q = dr.sqrt(dr.maximum(dr.square(cos_c) - dr.square(view.mu), 0.0)) / dr.maximum(view.sin_o, 1e-9)
@@ -187,7 +190,7 @@ def _cuts(view: _View, eta: Array | None, slope: Array, limit: Array) -> list[Ar
     delta = dr.atan((slope.x * view.wo.x + slope.y * view.wo.y) / (spread * view.mu))
 
     def x_at(theta: Array) -> Array:
-        """The variable x at an angle of the normal, limited to the end of the distribution."""
+        """The variable x for an angle of the normal, limited to the end of the distribution."""
         inside = theta < 0.5 * ops.pi - 1e-9
         t = dr.select(inside, dr.tan(dr.select(inside, theta, 0.0)) / spread, limit)
         return _asinh(dr.clip(t, 0.0, limit))
@@ -199,7 +202,7 @@ def _cuts(view: _View, eta: Array | None, slope: Array, limit: Array) -> list[Ar
     end = x_at(0.5 * ops.pi + dr.minimum(delta, 0.0))
     middle = dr.minimum(mirror_end, end)
     cos_c = dr.sqrt(dr.maximum(1.0 - dr.square(eta), 0.0))
-    reach = cos_c * dr.cos(delta) / view.mu  # cos_c / A, as A cos(delta) = mu
+    reach = cos_c * dr.cos(delta) / view.mu  # cos_c / A, because A cos(delta) = mu
     partly = (eta < 1.0) & (reach < 1.0)
     half = dr.acos(dr.minimum(reach, 1.0))
     low, high = [dr.minimum(x_at(dr.maximum(delta + s * half, 0.0)), end) for s in (-1.0, 1.0)]
@@ -251,7 +254,8 @@ def _over_slopes(
 
 
 def _in_three(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights of three pieces, each node given as the index of its piece plus the position in it."""
+    """Nodes and weights of three pieces; each node is given as the index of its piece plus the position in the
+    piece."""
     x, w = gauss(count)
     return np.concatenate([x, 1.0 + x, 2.0 + x]), np.tile(w, 3)
 

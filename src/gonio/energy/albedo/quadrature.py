@@ -1,12 +1,12 @@
-"""Directional albedo of microfacet models by deterministic quadrature: E(mu, alpha), its average, the split sum.
+"""Directional albedo of microfacet models by deterministic quadrature: E(mu, alpha), its average, and the split sum.
 
 With F = 1, the albedo of a microfacet BRDF is an integral over normals (dwi = 4 (o.m) dm, Walter2007, eq. 14):
 
-    E(o) = int D(m) G(o, i) (o.m) / (o.n) dm,   i = 2 (o.m) m - o,   over the m for which i lies above the surface.
+    E(o) = int D(m) G(o, i) (o.m) / (o.n) dm,   i = 2 (o.m) m - o,   over all m for which i is above the surface.
 
 The quadrature rule is defined in `normals`.
 
-**The error** of a value is estimated as its difference from the same integral with other numbers of nodes.
+**The error** of a value is estimated as its difference from the same integral computed with different numbers of nodes.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from .normals import Integrand, over_azimuths
 # Gauss-Legendre nodes in (chi, x). Measured errors of the worst texel of a 128 x 128 table with roughness >= 0.05:
 # 2e-7, and 1.4e-5 for Beckmann's `smith-separable`, whose rational fit jumps by 5e-5 at a = 1.6.
 NODES = (40, 32)
-JUDGE = (60, 48)  # the reference for NODES
-# The same for two widths: 1.2e-5 for ratios down to 0.1; NODES would suffice for nearly equal widths.
+JUDGE = (60, 48)  # numbers of nodes for the reference by which the error with NODES is estimated
+# The same for unequal alphas: errors of 1.2e-5 for ratios down to 0.1. NODES would suffice for nearly equal alphas.
 TURNED_NODES = (64, 32)
 TURNED_JUDGE = (96, 48)
 # For glass: nodes in (each of three pieces of chi, each of five pieces of x)
@@ -40,10 +40,10 @@ _LANES = 1 << 22  # points evaluated at once: 32 MiB per array
 
 
 class Points(NamedTuple):
-    """Points at which E is evaluated: numbers or arrays, which broadcast.
+    """Points at which E is evaluated: numbers, or arrays that are broadcast against each other.
 
     mu              cosine of wo, in [0, 1]
-    alpha, alpha_y  widths along x and y; isotropic if alpha_y is None
+    alpha, alpha_y  alphas along x and y; isotropic if alpha_y is None
     phi             azimuth of wo, radians
     """
 
@@ -61,14 +61,14 @@ class Moments(NamedTuple):
 
 
 class TwoWays(NamedTuple):
-    """Power reflected and transmitted by glass, at each point."""
+    """The power that glass reflects and the power that it transmits, at each point."""
 
     reflected: np.ndarray
     transmitted: np.ndarray
 
 
 def known_masking(name: str) -> str:
-    """The name itself. Raises InputError if there is no masking term of this name."""
+    """Return the name itself. Raises InputError if there is no masking term of this name."""
     return masking.term(name).name
 
 
@@ -84,7 +84,8 @@ def moments(
     """The albedo of the microfacet BRDF F D G / (4 cos cos) with F = 1, and with F = (1 - o.m)^5.
 
     mu ... phi  see `Points`
-    nodes       numbers of Gauss-Legendre nodes in azimuth and slope; None selects NODES, or TURNED_NODES for two widths
+    nodes       numbers of Gauss-Legendre nodes in azimuth and slope; None selects NODES, or TURNED_NODES if alpha_y is
+                given
     Returns float64 arrays of the broadcast shape.
     """
     known_masking(masking_name)
@@ -126,11 +127,12 @@ def glass(
     eta: ArrayLike,
     nodes: tuple[int, int] = GLASS_NODES,
 ) -> TwoWays:
-    """The power reflected and transmitted by a rough dielectric (albedo 1), whose sum is E(mu, alpha, eta).
+    """The power that a rough dielectric (albedo 1) reflects, and the power that it transmits; their sum is E(mu, alpha,
+    eta).
 
     points  the points (mu, alpha, alpha_y, phi) at which it is evaluated
-    eta     index on the far side divided by that on wo's side: if it is above 1, wo lies in the less dense medium, if
-            below 1, in the denser one
+    eta     index on the far side divided by the index on wo's side: above 1, wo is in the less dense medium; below 1,
+            it is in the denser one
     nodes   numbers of nodes in each piece of azimuth and of slope
     """
     known_masking(masking_name)
@@ -151,7 +153,7 @@ def glass(
 def average(
     ndf: str, masking_name: str, alpha: ArrayLike, nodes: tuple[int, int] | None = None, count: int = 32
 ) -> np.ndarray:
-    """E_avg = 2 int_0^1 E(mu) mu dmu at each isotropic alpha, by a Gauss-Legendre rule of `count` nodes in sqrt(mu).
+    """E_avg = 2 int_0^1 E(mu) mu dmu at each isotropic alpha, by a Gauss-Legendre rule with `count` nodes in sqrt(mu).
 
     nodes  as in `moments`
     """
@@ -168,11 +170,11 @@ def over_normals(
     eta: ArrayLike | None = None,
     nodes: tuple[int, int] | None = None,
 ) -> list[np.ndarray]:
-    """int D(m) (o.m) / mu terms(...) dm over the normals that reflect o to a direction above the surface or, with eta,
-    over those visible from o.
+    """int D(m) (o.m) / mu terms(...) dm over the normals that reflect o to a direction above the surface or, if eta is
+    given, over those visible from o.
 
     terms     function (ndf, wo, m, o.m, alpha, eta) that returns `channels` values, without D
-    eta       index on the far side divided by that on wo's side, for glass
+    eta       for glass, index on the far side divided by the index on wo's side
     nodes     numbers of nodes in azimuth and slope; for glass, in each piece of them
     Returns one array per channel, of the broadcast shape.
     """
@@ -182,7 +184,7 @@ def over_normals(
     given = [points.mu, points.alpha, across, points.phi, 2.0 if eta is None else eta]
     arrays = np.broadcast_arrays(*[np.asarray(v, float) for v in given])
     shape, flat = arrays[0].shape, [a.ravel() for a in arrays]
-    sides = 1 if isotropic else 2  # without anisotropy, the two sides of the plane of incidence are equal
+    sides = 1 if isotropic else 2  # without anisotropy, both sides of the plane of incidence are equal
     if eta is not None:
         nodes = (3 * nodes[0], nodes[1])
     rows = max(1, _LANES // (nodes[0] * sides))

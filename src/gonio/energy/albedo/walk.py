@@ -1,16 +1,17 @@
 """Random walks on the facets (Heitz2016): the reference for every compensation.
 
 The microsurface is a random height field with GGX slopes and heights uniform in [-1, 1] (their distribution does not
-affect the results). A walker at height h moving along w hits it after a distance whose distribution follows Smith's
-masking:
+affect the results). A walker at height h that moves along w hits the surface after a distance whose distribution
+follows from Smith's masking:
 
     it escapes upward with probability G1(w, h) = C(h)^Lambda(w),  C(h) = (h + 1) / 2,
-    otherwise the next height is C(h') = C(h) (1 - u)^(-1 / Lambda(w)), for upward and downward directions alike.
+    otherwise the next height is given by C(h') = C(h) (1 - u)^(-1 / Lambda(w)), for both upward and downward
+    directions.
 
 At that height, it hits a facet with a normal visible from -w, and is reflected with weight F (metal), or reflected or
 refracted with probabilities F and 1 - F (glass). A refracted walker continues in the mirrored frame, in which its own
-medium is above. Each hit adds the direct contribution along the target direction, phase function times G1 (next-event
-estimation), so the estimate is unbiased.
+medium is above. Each hit adds the direct contribution along the target direction, which is the phase function times G1
+(next-event estimation), so the estimate is unbiased.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ from ...optics import frame, fresnel
 from ...optics.ndf import distribution
 from ...optics.roughness import widths
 
-MAX_BOUNCES = 128  # at alpha = 1, less than 1e-9 of the light remains after these
-FLAT = 1e-6  # below this |w.z|, a walker stays at its height
+MAX_BOUNCES = 128  # at alpha = 1, less than 1e-9 of the light remains after this number of bounces
+FLAT = 1e-6  # value of |w.z| below which a walker remains at its height
 
 
 def signed_lambda(w: Direction, alpha: Pair) -> Scalar:
@@ -37,7 +38,7 @@ def signed_lambda(w: Direction, alpha: Pair) -> Scalar:
 
 
 def raised(base: Array, power: Scalar) -> Array:
-    """base^power, with its logarithm limited to +-80, since Dr.Jit's float64 power is NaN where it underflows."""
+    """base^power, with its logarithm limited to +-80, because Dr.Jit's float64 power is NaN if it underflows."""
     dr = backend.drjit()
     return dr.exp(dr.clip(power * dr.log(base), -80.0, 80.0))
 
@@ -50,7 +51,7 @@ def escape(w: Direction, height: Array, alpha: Pair) -> Array:
 
 
 def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Array]:
-    """C(h') at the next hit, and whether the walker escapes instead.
+    """C(h') at the next hit, and whether the walker escapes without another hit.
 
     height  C(h)
     u       random number in [0, 1)
@@ -69,7 +70,7 @@ def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Arr
 def visible_density(v: Direction, m: Direction, alpha: Pair) -> Scalar:
     """Density of visible normals for v above or below the horizon, max(v.m, 0) D(m) / projected area (Heitz2016)."""
     slant = sqrt(v.z * v.z + (alpha.x * v.x) * (alpha.x * v.x) + (alpha.y * v.y) * (alpha.y * v.y))
-    # v.z + slant cancels for v.z < 0; slant^2 - v.z^2 does not
+    # v.z + slant suffers from cancellation for v.z < 0; slant^2 - v.z^2 does not
     tangential = (alpha.x * v.x) * (alpha.x * v.x) + (alpha.y * v.y) * (alpha.y * v.y)
     area = 0.5 * where(v.z > 0.0, v.z + slant, tangential / maximum(slant - v.z, 1e-20))
     return maximum(dot(v, m), 0.0) * distribution("ggx").D(m, alpha) / maximum(area, 1e-20)
@@ -90,10 +91,10 @@ class _Facets:
         self.base, self.alpha = base, alpha
         self.glass = base.transmits
         self.metal = base.microsurface.eta is None
-        self.albedo = 1.0 if self.metal else base.albedo  # a metal's reflectance includes it
+        self.albedo = 1.0 if self.metal else base.albedo  # the reflectance of a metal includes its albedo
 
     def eta(self, side: Array) -> Array:
-        """Index on the far side divided by that of the walker's own medium."""
+        """Index on the far side divided by the index of the walker's own medium."""
         if self.metal:
             return type(side)(1.0)
         return backend.drjit().select(side > 0.0, self.base.eta, 1.0 / self.base.eta)
@@ -130,12 +131,12 @@ class _Facets:
 
 
 def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) -> tuple[Array, Left]:
-    """(light of two or more hits scattered along wi, times |cos theta_i|, end of the walk), of one walker per lane.
+    """For one walker per lane: (light scattered along wi after two or more hits, times |cos theta_i|; end of the walk).
 
     base   a bound conductor or dielectric
     wi     the target direction; None estimates no light
     rng    random number generators, one per lane
-    power  whether transmission is in power; else in radiance, which includes the factor (eta_o / eta_i)^2
+    power  whether transmission is measured as power; else as radiance, which includes the factor (eta_o / eta_i)^2
     """
     if isinstance(wo, Node):
         raise RecordingError("a random walk cannot be recorded: its number of steps depends on values", "RandomWalk")
@@ -204,7 +205,7 @@ def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
         state = (state ^ (state >> 15)) * UInt(0xC2B2AE35)
         state = state ^ (state >> 13)
     count = dr.width(state)
-    # equal pairs in one call differ by their lane
+    # equal pairs in one call differ in their lane
     lane = dr.arange(UInt, count) * UInt(0x9E3779B1)
     state = (state ^ lane ^ (lane >> 16)) * UInt(0x85EBCA6B)
     return kind.module.PCG32(size=count, initstate=kind.module.UInt64(state ^ (state >> 13)))

@@ -1,17 +1,17 @@
-"""The energy lost by single scattering, M(mu) = 1 - E(mu), as one short polynomial per roughness.
+"""The energy lost by single scattering, M(mu) = 1 - E(mu), as one polynomial of low degree per roughness.
 
-A compensated material needs M at both directions of every pair. Two bilinear lookups are eight gathers, which cost more
-than the complete Torrance-Sparrow term on current processors; a polynomial of degree 10 costs a third of that. Such a
-polynomial exists in the variable z of `gonio.energy.bend`, in which M is smooth for any width. M nearly vanishes toward
-the normal (z = 0), and often also toward grazing angles, where a polynomial in powers of z would lose its digits in
-float32. Therefore, it is expressed in the Bernstein basis with non-negative coefficients:
+A compensated material needs M at both directions of every pair. Two bilinear lookups require eight memory reads, which
+cost more than the complete Torrance-Sparrow term on current processors; a polynomial of degree 10 costs a third of
+that. Such a polynomial exists in the variable z of `gonio.energy.bend`, in which M is smooth for any alpha. M nearly
+vanishes toward the normal (z = 0), and often also toward grazing angles, where a polynomial in powers of z would be
+inaccurate in float32. Therefore, M is expressed in the Bernstein basis with non-negative coefficients:
 
     M = sum over k of c_k z^k r^(10 - k) = r^10 sum over k of c_k (z / r)^k,   1 / r = 1 + z / r,   c_k >= 0.
 
 Every term is positive, and z / r is computed without cancellation (`descent`), so M has full precision even where it is
-tiny. The rows of a table contain the c_k at equal steps of roughness and are interpolated linearly, together with
-M_avg, the integral of the polynomial itself, so that energy is conserved exactly with the table's values. Tables for
-two widths have two more axes; see `anisotropic`.
+very small. The rows of a table contain the c_k at equal steps of roughness and are interpolated linearly, together with
+M_avg, which is the integral of the polynomial itself, so that energy is conserved exactly with the values of the table.
+Tables for anisotropic materials have two more axes; see `anisotropic`.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from .. import cache
 from ..albedo import normals, quadrature
 from ..bend import DEGREE, Form, cosine, descent, form_of, numpy_knee, numpy_rise
 
-ROWS = 129  # roughness 0 to 1; linear interpolation between rows has an error of 3e-5
-LOBE_NODES = 256  # the interpolated density has an error of 1e-4; with 64 nodes, a sampled furnace lost 4e-4
+ROWS = 129  # rows for roughness 0 to 1; linear interpolation between rows has an error of 3e-5
+LOBE_NODES = 256  # the interpolated density has an error of 1e-4; with 64 nodes, 4e-4 was lost in a sampled furnace
 NODES_OF_FIT = 64
 STEPS_OF_FIT = 8
 
@@ -43,7 +43,7 @@ def bernstein(x: np.ndarray, degree: int) -> np.ndarray:
 
 
 def fit(form: Form, bend: np.ndarray, missing: Callable[..., np.ndarray], nodes: int = NODES_OF_FIT) -> np.ndarray:
-    """Fit c_k >= 0 to M at each bend, nearly minimax, by reweighted non-negative least squares.
+    """Fit c_k >= 0 to M at each bend, with a nearly minimal maximum error, by reweighted non-negative least squares.
 
     bend     the bends, (rows,)
     missing  function of mu (rows, nodes) that returns M
@@ -65,14 +65,15 @@ def _nodes(count: int) -> np.ndarray:
 
 
 def _importance(mu: np.ndarray) -> np.ndarray:
-    """The weight of the fit at mu. It is low below mu = 0.02, where albedo matters little and that of glass has a
+    """The weight of the fit at mu. It is low below mu = 0.02, where the albedo has little effect and, for glass, has a
     cusp."""
     return np.minimum(mu / 0.02, 1.0) + 0.02
 
 
 def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarray) -> np.ndarray:
-    """Non-negative coefficients whose largest error times importance is small: the best of several reweighted fits."""
-    from scipy.optimize import nnls  # imported late: not needed by renders whose tables exist
+    """Non-negative coefficients for which the maximum of error times importance is small, from several reweighted
+    fits."""
+    from scipy.optimize import nnls  # imported here because renders whose tables exist do not need it
 
     weight, best, least = importance, np.zeros(basis.shape[1]), np.inf
     for _ in range(STEPS_OF_FIT):
@@ -117,21 +118,21 @@ def lobe(ndf: str, masking: str) -> Table:
     return Table(f"lobe_{ndf}_{masking}".replace("-", "_"), inverse[..., None])
 
 
-ASPECTS = 17  # sqrt(alpha_min / alpha_max), 0 to 1: furnace error 1e-3 up to a ratio of 9, 1e-2 at 40
-ASPECT_ROWS = 33  # sqrt(alpha_max), 0 to 1
-HARMONICS = 7  # terms of a polynomial in y
-AZIMUTHS = 13  # nodes of their fit
-TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z by terms in y, M_avg, padding
+ASPECTS = 17  # nodes of sqrt(alpha_min / alpha_max) in [0, 1]: furnace error 1e-3 up to a ratio of 9, 1e-2 at 40
+ASPECT_ROWS = 33  # nodes of sqrt(alpha_max) in [0, 1]
+HARMONICS = 7  # number of terms of a polynomial in y
+AZIMUTHS = 13  # nodes for the fit of these polynomials
+TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z times terms in y, M_avg, padding
 
 
 @cache.of_members
 def anisotropic(ndf: str, masking: str) -> Table:
-    """The table of coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) for a metal with two widths.
+    """The table of coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) for an anisotropic metal.
 
-    In azimuth, M depends on y = cos(2 phi') with tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), where phi is
-    measured from the axis of the larger width; the bend is that of the width along w, alpha_phi^2 =
-    alpha_max^2 cos^2 phi + alpha_min^2 sin^2 phi. Channel k HARMONICS + j is the coefficient of Y^j (1 - Y)^(6 - j),
-    with Y = (1 + y) / 2, in c_k; all are non-negative.
+    M depends on the azimuth through y = cos(2 phi') with tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), where phi is
+    measured from the axis of the larger alpha; the bend is that of the alpha along w, alpha_phi^2 = alpha_max^2 cos^2
+    phi + alpha_min^2 sin^2 phi. Channel k HARMONICS + j is the coefficient of Y^j (1 - Y)^(6 - j), with
+    Y = (1 + y) / 2, in c_k; all coefficients are non-negative.
     """
 
     def build() -> np.ndarray:
@@ -176,13 +177,13 @@ def anisotropic(ndf: str, masking: str) -> Table:
 
 
 def _azimuth(y: float, big: np.ndarray, small: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """cos^2 phi, sin^2 phi and alpha_phi at y = cos(2 phi'), for widths `big` and `small`."""
+    """cos^2 phi, sin^2 phi and alpha_phi at y = cos(2 phi'), for the alphas `big` and `small`."""
     # tan^2(phi) = (1 - y) / (1 + y) big / small
     cos2 = small * (1.0 + y) / (small * (1.0 + y) + big * (1.0 - y))
     return cos2, 1.0 - cos2, np.sqrt(big**2 * cos2 + small**2 * (1.0 - cos2))
 
 
-GLASS_ETAS = 21  # at equal steps of the root of sqrt(F0) = (eta - 1) / (eta + 1): M varies fastest near eta = 1
+GLASS_ETAS = 21  # nodes at equal steps of the root of sqrt(F0) = (eta - 1) / (eta + 1): M varies fastest near eta = 1
 GLASS_ROWS = 33
 GLASS_LOBE_NODES = 96
 MAX_ROOT = 2.0 / 3.0  # eta = 5
@@ -217,8 +218,8 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
 
 
 def widths_along(w: Direction, alpha: Pair, root: Scalar) -> tuple[Scalar, Scalar]:
-    """The isotropic widths at which glass loses about as much energy along w as with two widths, for light from the
-    less dense and from the denser side.
+    """The isotropic alphas for which glass loses about as much energy along w as with the two given alphas, for light
+    from the less dense and from the denser side.
 
     root  sqrt(F0)
     """
@@ -229,14 +230,14 @@ def widths_along(w: Direction, alpha: Pair, root: Scalar) -> tuple[Scalar, Scala
 def _squares(x2: Array, y2: Array, cos: Array, alpha_x2: Array, alpha_y2: Array, root: Array) -> tuple[Array, Array]:
     """The squares of `widths_along`.
 
-    At normal incidence, the width is about the root mean square of the two. At grazing incidence, masking by the width
-    along the direction dominates. With S and D the sum and the difference of the squared widths,
-    alpha^2 = S / 2 + o D sin^2 theta cos(2 phi) + e D^2 / S; o and e are fitted to the width that yields M exactly, for
-    indices 1.15, 1.5 and 2.2 and four pairs of widths.
+    At normal incidence, alpha is about the root mean square of the two given alphas. At grazing incidence, masking by
+    the alpha along the direction dominates. If S and D are the sum and the difference of the squared alphas,
+    alpha^2 = S / 2 + o D sin^2 theta cos(2 phi) + e D^2 / S, where o and e are fitted to the alpha that yields M
+    exactly, for indices 1.15, 1.5 and 2.2 and four pairs of alphas.
     """
     S, D, difference, low = alpha_x2 + alpha_y2, alpha_x2 - alpha_y2, x2 - y2, 1.0 - cos
     bent, across, low2 = D * D / S, difference / (1.0 + cos), low * low
-    low8, near = low2 * low2 * low2 * low2, 0.04 / (0.04 + root * root)  # near index 1 the two sides are equal
+    low8, near = low2 * low2 * low2 * low2, 0.04 / (0.04 + root * root)  # near index 1, both sides are equal
     thin = 0.5 * S + D * difference * (0.5 - 0.7 * root + 0.06 * low8) + bent * (0.35 * root * (1.0 - 0.6 * low8))
     dense = 0.5 * S + D * difference * (low2 * low2 - 0.1) + bent * low * (1.3 * across * across - 0.48)
     return thin, dense + (thin - dense) * (near * near)
@@ -284,7 +285,7 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
 
 @cache.of_members
 def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """The tables `lobe` of rough glass over (root of sqrt(F0), roughness, u), by side."""
+    """The tables of `lobe` for rough glass over (root of sqrt(F0), roughness, u), by side."""
     alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, normals.SMALLEST_ALPHA)
     tables = {}
     for side, table in glass(ndf, masking, fresnel).items():
@@ -306,7 +307,7 @@ def _inverse(form: Form, rows: np.ndarray, bend: np.ndarray, count: int) -> np.n
 
 
 def coefficients(ndf: str, masking: str, alpha: Scalar) -> tuple[Scalar, ...]:
-    """The coefficients c_0 to c_10 and M_avg at an isotropic width."""
+    """The coefficients c_0 to c_10 and M_avg for an isotropic alpha."""
     row = ops.inset(sqrt(alpha), ROWS)
     return ops.lookup(isotropic(ndf, masking), row)
 
@@ -354,7 +355,7 @@ def missing(form: Form, c: tuple[Array, ...], bend: Array, mu: Array) -> Array:
     """M(mu), clamped to >= 0.
 
     c     the coefficients c_k, which may be followed by other values
-    bend  `knee` at the width
+    bend  `knee` for the alpha
     """
     ratio = descent(form, mu, bend)
     return _polynomial(c[: form.degree + 1], ratio) / _power(1.0 + ratio, form.degree)

@@ -1,15 +1,15 @@
 """The energy lost by single scattering in rough glass, for both sides of the surface.
 
-From side a, a fraction T_a of the lost energy goes to side b, the rest back to a (power, not radiance):
+Of the energy lost on side a, a fraction T_a is sent to side b, and the rest back to side a (power, not radiance):
 
     f_reflected = (1 - T_a) M_a(o) M_a(i) / (pi M_avg,a),    f_transmitted = T_a M_a(o) M_b(i) / (pi M_avg,b),
 
-so that no energy is lost from side a for any T_a. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, requires
-T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). As (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, it is satisfied by
-T_a = (1 - F_avg,a) M_avg,b / (M_avg,a + M_avg,b)  (Kulla2017, p. 30).
+so that no energy of light from side a is lost for any T_a. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, requires
+T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). Because (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, this condition holds
+for T_a = (1 - F_avg,a) M_avg,b / (M_avg,a + M_avg,b)  (Kulla2017, p. 30).
 
-M of anisotropic glass is that of an isotropic width that depends on the direction (`curves.widths_along`); the lobe is
-sampled with the mean width.
+M of anisotropic glass is that of isotropic glass with an alpha that depends on the direction (`curves.widths_along`);
+the lobe is sampled with the mean alpha.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ from .reflecting import has_two_widths
 class Side(NamedTuple):
     """One side of the surface.
 
-    c           coefficients of M; for two widths, at their mean
+    c           coefficients of M; if the alphas differ, for their mean
     bend        the cosine below which masking is strong
-    scale       1 / (pi M_avg) of the polynomial with these coefficients; 0 if nothing is missing
-    true_scale  1 / (pi M_avg) of M itself; equal to `scale` for one width
-    through     T, the fraction of this side's lost energy that goes to the other side
+    scale       1 / (pi M_avg) of the polynomial with these coefficients; 0 if no energy is lost
+    true_scale  1 / (pi M_avg) of M itself; equal to `scale` if the alphas are equal
+    through     T, the fraction of this side's lost energy that is sent to the other side
     """
 
     c: tuple[Scalar, ...]
@@ -61,7 +61,7 @@ class Side(NamedTuple):
 
 
 class TwoWidths(NamedTuple):
-    """The two widths and the rotation of the base."""
+    """The two alphas and the rotation of the base."""
 
     alpha: Pair
     rotation: Pair | None
@@ -71,11 +71,11 @@ class Glass(NamedTuple):
     """Both sides of a surface; "thin" is the less dense one.
 
     average  mean of M_avg over the two sides
-    F_avg    albedo of the base; base and lobe together preserve this fraction of the energy
-    place    coordinates, for index and width, in the tables of the inverses of the lobes
+    F_avg    albedo of the base; the base and the lobe together preserve this fraction of the energy
+    place    coordinates, for index and alpha, in the tables of the inverses of the lobes
     inside   index inside divided by index outside
     names    names of the distribution, the masking term and the Fresnel kind
-    two      the two widths, if they differ
+    two      the two alphas, if they differ
     """
 
     thin: Side
@@ -110,7 +110,7 @@ class Glass(NamedTuple):
         return self._missing(w, c, bends)
 
     def of_mean_width(self, w: Direction) -> Scalar:
-        """M of the mean width, by which the lobe is sampled."""
+        """M of the mean alpha, which is used to sample the lobe."""
         return self._missing(w, [self.thin.c, self.dense.c], [self.thin.bend, self.dense.bend])
 
     def _missing(self, w: Direction, coefficients: list[tuple[Scalar, ...]], bends: list[Scalar]) -> Scalar:
@@ -142,7 +142,7 @@ class Glass(NamedTuple):
         return where(self.thin.scale > 0.0, self.at(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """M(mu_i) mu_i / (pi M_avg) of wi's side and the mean width, times the fraction for that side."""
+        """M(mu_i) mu_i / (pi M_avg) for wi's side and the mean alpha, times the fraction for that side."""
         scale = where(self.is_thin(wi), self.thin.scale, self.dense.scale)
         return self.of_mean_width(wi) * abs(wi.z) * scale * self.share(wo, wi)
 
@@ -158,7 +158,7 @@ class Glass(NamedTuple):
         return vec3(w.x, w.y, where(below, -w.z, w.z))
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
-        """Index on wi's side divided by that on wo's side."""
+        """Index on wi's side divided by the index on wo's side."""
         return where(wo.z * wi.z > 0.0, 1.0, where(wo.z >= 0.0, self.inside, 1.0 / self.inside))
 
 
@@ -168,7 +168,7 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
     surface  microsurface of the base
     """
     index = surface.eta
-    assert index is not None, "what transmits has an index"
+    assert index is not None, "a base that transmits has an index"
     names = surface.ndf, surface.masking, surface.fresnel
     alpha, _ = widths(surface.alpha)
     two = has_two_widths(base.plain)
@@ -187,7 +187,7 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
         m_thin, m_dense = (maximum(m, 0.0) for m in lookup(curves.glass_of_two(*names), place[0], *aspect))
     both = maximum(m_thin + m_dense, 2.0 * lobe.NOTHING)
     some = (m_thin > lobe.NOTHING) & (m_dense > lobe.NOTHING) & (abs(index - 1.0) > 1e-4)
-    reflected: Array = base.mean_reflectance()  # a single number for glass
+    reflected: Array = base.mean_reflectance()  # a single number, because the base is glass
     enters = 1.0 - reflected
 
     def side(name: str, fit: tuple[Scalar, ...], of_mean: Scalar, average: Scalar, through: Scalar) -> Side:

@@ -24,9 +24,9 @@ def missing_energy(base: BSDF, average: str = "exact") -> MissingEnergy:
 def check_base(base: BSDF, location: str, transmitting: bool, any_base: bool = False) -> None:
     """Raise InputError if a base cannot be compensated.
 
-    location      the place of the base, for errors
+    location      the location of the base, for errors
     transmitting  whether a microsurface may transmit
-    any_base      whether any base that reflects by a finite lobe is accepted, not only a microsurface
+    any_base      whether any base whose reflection lobes are finite is accepted, not only a microsurface
     """
     name = type(base).__name__
     if base.microsurface is not None:
@@ -47,4 +47,4 @@ def check_base(base: BSDF, location: str, transmitting: bool, any_base: bool = F
         what = f"{name} contains a base whose energy is measured; measurements cannot be nested"
         raise InputError(what, location, hint)
     if not base.isotropic:
-        raise InputError(f"{name} contains two widths, one expected", location, hint)
+        raise InputError(f"{name} is anisotropic, an isotropic material expected", location, hint)

@@ -14,21 +14,21 @@ from ...optics.roughness import SMOOTH, widths
 from ..bend import form_of, knee
 from . import curves, lobe
 
-APART = 0.05  # relative difference of two widths above which only their own fit is used
+APART = 0.05  # relative difference of two alphas above which only the anisotropic fit is used
 
 
 class Reflecting(NamedTuple):
-    """M as one Bernstein polynomial per width; see `curves`.
+    """M as one Bernstein polynomial per alpha; see `curves`.
 
-    c             coefficients of the polynomial; for two widths, at their mean
+    c             coefficients of the polynomial; if the alphas differ, for their mean
     bend          the cosine below which masking is strong
     scale         1 / (pi M_avg) of this polynomial
-    true_scale    1 / (pi M_avg) of M itself; equal to `scale` for one width
+    true_scale    1 / (pi M_avg) of M itself; equal to `scale` if the alphas are equal
     average       M_avg
     F_avg         mean reflectance
     factor        albedo of the base
     row           coordinate in the table of the inverse of the lobe
-    two           `TwoWidths`, if the widths differ
+    two           `TwoWidths`, if the alphas differ
     ndf, masking  names of the distribution and the masking term
     """
 
@@ -52,7 +52,7 @@ class Reflecting(NamedTuple):
         return even + self.two.apart * (self.two.at(w, self.ndf, self.masking) - even)
 
     def of_mean_width(self, w: Direction) -> Scalar:
-        """M at the mean width, for a direction above the surface."""
+        """M for the mean alpha, at a direction above the surface."""
         return curves.missing(form_of(self.ndf, self.masking), self.c, self.bend, w.z)
 
     def over_average(self, w: Direction) -> Scalar:
@@ -68,11 +68,11 @@ class Reflecting(NamedTuple):
         return where((self.scale > 0.0) & (wo.z > 0.0), self.at(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The density of the lobe, 1/sr: M(mu_i) mu_i / (pi M_avg), for two widths the average of that of the mean
-        width and that of the larger one.
+        """The density of the lobe, 1/sr: M(mu_i) mu_i / (pi M_avg) or, if the alphas differ, the average of this
+        density for the mean alpha and for the larger one.
 
-        M of two widths is far above that of the mean width near the normal, and above that of the larger one at grazing
-        angles.
+        M of an anisotropic surface is far above that of the mean alpha near the normal, and above that of the larger
+        alpha at grazing angles.
         """
         density = self.of_mean_width(wi) * self.scale
         if self.two is not None:
@@ -93,7 +93,7 @@ class Reflecting(NamedTuple):
 
 
 class OneWidth(NamedTuple):
-    """M of one width and the lobe proportional to M mu.
+    """M for one alpha, and the lobe proportional to M mu.
 
     c      coefficients of the polynomial
     bend   the cosine below which masking is strong
@@ -112,14 +112,14 @@ class OneWidth(NamedTuple):
 
 
 class TwoWidths(NamedTuple):
-    """M for two widths, which depends on azimuth; see `curves.anisotropic`.
+    """M for two alphas, which depends on the azimuth; see `curves.anisotropic`.
 
     c_phi     for each coefficient of M, its coefficients in azimuth
-    alpha     the two widths
+    alpha     the two alphas
     rotation  rotation of the base
-    apart     weight of this M relative to that of the mean width; 0 for equal widths, where the two fits differ by up
-              to 2 % of a small value
-    larger    M of the larger width, by which half of the lobe is sampled
+    apart     weight of this M relative to that of the mean alpha; 0 for equal alphas, for which the two fits differ by
+              up to 2 % of a small value
+    larger    M for the larger alpha, with which half of the lobe's samples are generated
     """
 
     c_phi: tuple[Scalar, ...]
@@ -180,12 +180,12 @@ def _one_width(surface: Microsurface, width: Scalar) -> OneWidth:
 
 
 def has_two_widths(base: BSDF) -> bool:
-    """Whether an unbound base has, or may have, two different widths, on which the code depends."""
+    """Whether an unbound base has, or may have, two different alphas, on which the code depends."""
     return base.microsurface is not None and has_two_values(base.microsurface.alpha)
 
 
 class Azimuth(NamedTuple):
-    """The azimuth of a direction between the axes of the larger and the smaller width, and the width along it."""
+    """The azimuth of a direction between the axes of the larger and the smaller alpha, and the alpha along it."""
 
     along: Scalar
     across: Scalar
@@ -194,7 +194,7 @@ class Azimuth(NamedTuple):
 
 @function
 def _azimuth(w: Direction, alpha: Pair) -> Azimuth:
-    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi along w; for the normal, the azimuth is arbitrary."""
+    """(1 + y) / 2, (1 - y) / 2 and the alpha along w, alpha_phi; for the normal, the azimuth is arbitrary."""
     sin2 = maximum(frame.sin2(w), 1e-12)
     along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
     width = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, SMOOTH**2))

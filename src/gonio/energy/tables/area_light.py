@@ -1,8 +1,8 @@
-"""Light from polygons by linearly transformed cosines (Heitz2016a), in the operations from which shaders are written.
+"""Light from polygons by linearly transformed cosines (Heitz2016a), written in the operations that shaders can contain.
 
-A lobe is approximated by E(o) D(i), where D is the cosine lobe transformed by a matrix W: D(i) = cos+(W i) |det W| /
-(pi |W i|^3). The integral of D over a polygon P is that of the cosine lobe over the polygon W P, which is known
-(Lambert).
+A lobe is approximated by E(o) D(i), where D is the cosine lobe transformed by a matrix W: D(i) = cos+(W i) |det
+W| / (pi |W i|^3). The integral of D over a polygon P is the integral of the cosine lobe over the polygon W P, for which
+Lambert's closed form exists.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Corners = tuple[Direction, Direction, Direction, Direction]
 @function
 def edge(a: Direction, b: Direction) -> Scalar:
     """The contribution of an edge of a polygon to the integral of the cosine lobe, times 2 pi: the angle between the
-    vectors a and b to its ends, times the z of the unit normal of their plane."""
+    vectors a and b to its ends, times the z component of the unit normal of their plane."""
     across = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
     sine = norm(across)
     return across.z * safe_div(ops.atan2(sine, where(sine > 0.0, dot(a, b), 1.0)), sine)
@@ -46,7 +46,7 @@ def visible_edge(a: Direction, b: Direction) -> Scalar:
 
 @function
 def horizon(a: Direction, b: Direction) -> Direction:
-    """A vector toward the point at which an edge crosses the horizon, if its ends lie on different sides."""
+    """A vector toward the point at which an edge crosses the horizon, for ends on different sides of the horizon."""
     return a * ops.abs(b.z) + b * ops.abs(a.z)
 
 
@@ -65,7 +65,7 @@ def cosine_quad(a: Direction, b: Direction, c: Direction, d: Direction) -> Scala
     total = visible_edge(a, b) + visible_edge(b, c) + visible_edge(c, d) + visible_edge(d, a)
     out = leaving(a, b) + leaving(b, c) + leaving(c, d) + leaving(d, a)
     back = leaving(b, a) + leaving(c, b) + leaving(d, c) + leaving(a, d)
-    return ops.abs(total + edge(out, back)) * (0.5 / ops.pi)  # the cut itself is an edge of the visible part
+    return ops.abs(total + edge(out, back)) * (0.5 / ops.pi)  # the cut along the horizon is an edge, too
 
 
 @function
@@ -91,7 +91,7 @@ def quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar
 
 @function
 def in_view(wo: Direction, p: Direction) -> Direction:
-    """p in the frame whose x axis lies below wo, for a surface whose own axes are planes of symmetry.
+    """p in the frame whose x axis lies below wo, for a surface that is symmetric about the planes of its axes.
 
     First, wo and p are mirrored so that wo lies between +x and +y.
     """
@@ -105,7 +105,7 @@ def in_view(wo: Direction, p: Direction) -> Direction:
 def turned_quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) -> Scalar:
     """`quad` for an anisotropic lobe.
 
-    inverse  the numbers of W by rows, without the middle one, which is 1. W acts in the frame of `in_view`
+    inverse  the entries of W by rows, without the center one, which is 1; W acts in the frame of `in_view`
     """
     a, b, c, d, e, f, g, h = inverse
 
@@ -118,7 +118,7 @@ def turned_quad(inverse: tuple[Scalar, ...], wo: Direction, corners: Corners) ->
 
 
 def turned_coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
-    """`coordinates` for a table with an axis for the azimuth before that for the angle."""
+    """`coordinates` for a table in which an axis for the azimuth precedes the axis for the angle."""
     size = wo.x * wo.x + wo.y * wo.y
     azimuth = ops.atan2(ops.abs(wo.y), where(size > 1e-16, ops.abs(wo.x), 1.0)) * (2.0 / ops.pi)
     column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])
@@ -127,6 +127,7 @@ def turned_coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[
 
 
 def coordinates(table: Table, roughness: Scalar, wo: Direction) -> tuple[Scalar, ...]:
-    """The coordinates at which a table is read for a roughness and wo; only that of the angle for a single row."""
+    """The coordinates at which a table is read for a roughness and wo; if it has one row, only the coordinate of the
+    angle."""
     column = inset(sqrt(maximum(1.0 - wo.z, 0.0)), table.shape[-1])
     return (inset(minimum(roughness, 1.0), table.shape[0]), column) if len(table.shape) == 2 else (column,)

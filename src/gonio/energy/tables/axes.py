@@ -1,12 +1,12 @@
 """The axes of baked tables: the positions of the nodes in each layout.
 
-    linear     nodes at texel centers, (j + 1/2) / N, of roughness, mu and, for two widths, phi within a quarter turn:
-               the layout of shaders and the homework
+    linear     nodes at texel centers, (j + 1/2) / N, of roughness, mu and, if anisotropic, phi within a quarter turn:
+               the layout of shaders and of the homework
     stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1), in which E is smooth (see `stretch`):
                the error of bilinear interpolation is a hundredth of that on a linear axis
 
-For two widths, the larger is roughness^2, and the table defines their ratio. E is even in phi about both axes of the
-surface, so a quarter turn suffices, and mirroring at its ends is exact.
+If the alphas differ, the larger is roughness^2, and the table defines their ratio. E is symmetric in phi about both
+axes of the surface, so a quarter turn suffices, and mirroring at its ends is exact.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Axes:
     ndf, masking  names of the distribution and the masking term
     size      number of nodes of roughness, and of mu
     aspect    alpha_y / alpha_x
-    azimuths  number of nodes of phi; 0 for one width, whose tables have no such axis
+    azimuths  number of nodes of phi; 0 if the alphas are equal, because such tables have no axis for phi
     """
 
     layout: str
@@ -56,7 +56,7 @@ class Axes:
     def at(self, *index: Any) -> Points:
         """The points at given indices.
 
-        index  one array per axis, which broadcast; integers are nodes, other values lie between them
+        index  one array per axis, broadcast against each other; integers are nodes, other values lie between nodes
         """
         roughness = self.roughness(index[-2])
         if not self.azimuths:
@@ -74,8 +74,8 @@ class Axes:
         return self._unit(index, self.size)
 
     def phi(self, index: Any) -> np.ndarray:
-        """Azimuth at an index. In the stretched layout, the azimuth of slopes divided by their widths increases in
-        equal steps."""
+        """Azimuth at an index. In the stretched layout, the steps of the azimuth are equal after slopes have been
+        divided by the alphas."""
         turn = self._unit(index, self.azimuths) * (0.5 * np.pi)
         return turn if self.layout == "linear" else np.arctan2(np.sin(turn), self.aspect * np.cos(turn))
 
@@ -93,7 +93,7 @@ class Axes:
         return alpha * min(1.0, 1.0 / self.aspect), alpha * min(1.0, self.aspect)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The nodes of each axis by name. In the stretched layout, those of mu are given per row (and slice)."""
+        """The nodes of each axis by name. In the stretched layout, the nodes of mu are given per row (and slice)."""
         index = np.ix_(*map(np.arange, self.shape))
         nodes = self.at(*index)
         mu = nodes.mu if self.layout == "stretched" else nodes.mu[(0,) * (len(self.shape) - 1)]
@@ -121,14 +121,14 @@ class Axes:
 def stretch(ndf: str, masking: str) -> tuple[bend.Form, str]:
     """The transform of mu to the s of the stretched axis, and its description."""
     if not term(masking).smith:
-        return bend.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k the masking's"
+        return bend.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k of the masking"
     if distribution(ndf).falls_slowly:
         return bend.Form(0, 1, 4.0), "sqrt(mu / (mu + 4 alpha))"
     return bend.Form(1, 2, 4.0), "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))"
 
 
 def stretched_mu(ndf: str, masking: str, alpha: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The cosine at a position x in [0, 1] of the stretched axis, for a given width."""
+    """The cosine at a position x in [0, 1] of the stretched axis, for a given alpha."""
     form, _ = stretch(ndf, masking)
     knee = bend.numpy_knee(form, masking, np.maximum(alpha, normals.SMALLEST_ALPHA))
     return bend.cosine(form, x, knee)

@@ -3,9 +3,9 @@
     baked = bake("ggx", masking="smith-separable", size=128)
     baked.arrays["E"]            # [roughness, mu]
     baked.manifest["error"]      # {"E": {"max": ..., "rms": ..., "interpolation": ...}, ...}
-    bake("ggx", aspect=0.25)     # two widths: E[phi, roughness, mu]
+    bake("ggx", aspect=0.25)     # anisotropic: E[phi, roughness, mu]
 
-The axes are defined in `axes`, files and the homework's pictures in `baked`.
+The axes are defined in `axes`; files and the homework's pictures are defined in `baked`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ LUTS = {
 }
 NAMES = {"E": ("E",), "Eavg": ("E_avg",), "dfg": ("dfg",), "glass": ("E_glass_thin", "E_glass_dense")}
 MAX_SIZE = 4096
-AZIMUTHS = 24  # stretched layout, alpha_y = alpha_x / 4: the error of linear interpolation is 1.2e-3
+AZIMUTHS = 24  # in the stretched layout, for alpha_y = alpha_x / 4, the error of linear interpolation is 1.2e-3
 LARGEST_ASPECT = 100.0
 GLASS_STEPS = 16
 MAX_ROOT = 2.0 / 3.0  # (eta - 1) / (eta + 1) for eta = 5
@@ -62,17 +62,17 @@ def bake(
     """Bake tables of a distribution (at F = 1) or of a material.
 
     target    the name of a distribution, a Conductor or a Dielectric, for tables with alpha = roughness^2 along an
-              axis; those of a Dielectric are for light from outside. For any other material, E[mu] and E_avg are
+              axis; the tables of a Dielectric are for light from outside. For any other material, E[mu] and E_avg are
               computed with its own parameters
     lut       names of the tables: "E", "Eavg", "dfg", "glass"; None selects E and Eavg, and for a distribution also dfg
     size      number of nodes of roughness and of mu, 1 to 4096
     masking   masking term for a distribution, by default smith-correlated; a material has its own
     layout    layout of the axes, "linear" or "stretched" (see `axes`)
-    aspect    alpha_y / alpha_x of a distribution, whose larger width is roughness^2; a value other than 1 adds the axis
-              phi, a quarter turn from x. The aspect of a material is the ratio of its widths; its rotation is ignored
+    aspect    alpha_y / alpha_x of a distribution, whose larger alpha is roughness^2; a value other than 1 adds the axis
+              phi, a quarter turn from x. The aspect of a material is the ratio of its alphas; its rotation is ignored
     azimuths  number of nodes of phi
     sampling  the method: quadrature, or random samples; E_avg of a sampled table is integrated from its rows
-    Raises InputError for unknown names, for numbers out of range, and for tables that the target does not have.
+    Raises InputError for unknown names, for numbers out of range, and for tables that do not exist for the target.
     """
     material = isinstance(target, BSDF)
     lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
@@ -136,7 +136,7 @@ def cached(target: str | BSDF, **options: Any) -> Baked:
     """`bake`, cached in the user's cache folder (`gonio.energy.cache`).
 
     options  arguments of `bake`
-    Only tables of distributions and of Gonio's microsurfaces are cached, since the formulas of other materials may be
+    Only tables of distributions and of Gonio's microsurfaces are cached, because the formulas of other materials may be
     in any file.
     """
     if isinstance(target, BSDF) and not tabulated(target):
@@ -222,12 +222,12 @@ def _check_target(asked: Target, axes: Axes, lut: tuple[str, ...] | list[str], m
         hint = "bake its distribution, such as ggx: that table serves any F0"
         raise InputError("split sum requested for a material", "--lut", hint)
     if "glass" in lut and (axes.azimuths or asked.conducts):
-        what = "glass with two widths requested" if axes.azimuths else f"glass requested for a {kind}"
-        raise InputError(what, "--lut", "this table exists for a distribution or a Dielectric, with one width")
+        what = "anisotropic glass requested" if axes.azimuths else f"glass requested for a {kind}"
+        raise InputError(what, "--lut", "this table exists for a distribution or a Dielectric, with one alpha")
 
 
 def _aspect(model: Any, given: float) -> float:
-    """alpha_y / alpha_x: the given value, or that of a material's widths."""
+    """alpha_y / alpha_x: the given value, or the ratio of a material's alphas."""
     if model is not None:
         check_uniform(model)
         x, y = map(float, pair_of(model.microsurface.alpha))
@@ -247,7 +247,7 @@ def _directional(
 ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
     exact = asked.exact(axes.nodes())
     if sampling.method == "quadrature":
-        # compared at the most difficult columns, near grazing and near the normal, and at every fourth
+        # compared at the most difficult columns, near grazing angles and near the normal, and at every fourth column
         n = axes.size
         some = np.unique(np.concatenate([np.arange(min(4, n)), np.arange(0, n, 4), [n - 1]]))
         slices = [np.arange(0, axes.azimuths, 5)] if axes.azimuths else []
@@ -260,7 +260,7 @@ def _directional(
 
 
 def _averaged(asked: Target, axes: Axes, sampled: np.ndarray | None) -> tuple[np.ndarray, dict[str, float]]:
-    """E_avg and its error, from comparing the quadrature with a finer one, or sampled values with the quadrature."""
+    """E_avg and its error, from a comparison of the quadrature with a finer one, or of samples with the quadrature."""
     rows = np.arange(axes.size)
     exact = asked.average(axes, rows)
     if sampled is not None:
@@ -270,7 +270,7 @@ def _averaged(asked: Target, axes: Axes, sampled: np.ndarray | None) -> tuple[np
 
 
 def _average_of_rows(table: np.ndarray, axes: Axes) -> np.ndarray:
-    """E_avg of a table from its nodes, each of which represents the interval halfway to its neighbors."""
+    """E_avg of a table from its nodes, each of which represents the interval that extends halfway to its neighbors."""
     nodes = axes.nodes()
     weight = 2.0 * nodes.mu * (np.gradient(nodes.mu, axis=-1) if axes.size > 1 else 1.0)
     if axes.azimuths > 1:
@@ -280,10 +280,10 @@ def _average_of_rows(table: np.ndarray, axes: Axes) -> np.ndarray:
 
 
 def _between(value: Callable[..., np.ndarray], axes: Axes, extra: int = 0) -> float:
-    """Largest error of linear interpolation for roughness >= 0.1, at the midpoints of cells and of their edges.
+    """The largest error of linear interpolation for roughness >= 0.1, at the midpoints of cells and of their edges.
 
-    value  function that returns E at indices, which are integers or halves
-    extra  number of nodes of an additional axis before those of `axes`; 0 if there is none
+    value  function that returns E at indices, which are integers or half-integers
+    extra  number of nodes of an additional axis that precedes those of `axes`; 0 if there is none
     """
     shape = (*([extra] if extra else []), *axes.shape)
     rows = np.flatnonzero(axes.roughness(np.arange(axes.size))[:-1] >= 0.1)
@@ -293,7 +293,7 @@ def _between(value: Callable[..., np.ndarray], axes: Axes, extra: int = 0) -> fl
     rows = rows[:: max(1, len(rows) // (8 if deep else 24))]
     last = axes.size - 1
     count = 48 if deep else 128
-    # columns are denser toward grazing, where E varies most
+    # columns are denser toward grazing angles, where E varies most
     columns = np.arange(last) if last < count else np.unique(np.geomspace(1, last, count).astype(int) - 1)
     cells = [np.arange(max(n - 1, 1)) for n in shape[:-2]] + [rows, columns]
     free = [n > 1 for n in shape]
@@ -377,6 +377,6 @@ def _any_material(model: BSDF, lut: tuple[str, ...] | list[str], size: int, meth
 
 
 def tabulated(model: BSDF) -> bool:
-    """Whether tables of a material are cached between runs. Only those of Gonio's microsurfaces are, since the formulas
-    of others may be in any file."""
+    """Whether tables of a material are cached between runs. Only tables of Gonio's microsurfaces are cached, because
+    the formulas of others may be in any file."""
     return model.microsurface is not None and type(model).__module__.startswith("gonio.")

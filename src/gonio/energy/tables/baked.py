@@ -30,7 +30,7 @@ class Baked:
         return _html.table(rows(self.manifest), headings(self.manifest), title(self.manifest))
 
     def npz(self) -> bytes:
-        """The bytes of tables.npz, which includes the manifest and its hash. Equal content gives equal bytes."""
+        """The bytes of tables.npz, which includes the manifest and its hash. Equal content yields equal bytes."""
         text = json.dumps(self.manifest)
         texts = {"manifest": np.array(text), "seal": np.array(_seal(text))}
         stream = io.BytesIO()
@@ -43,7 +43,7 @@ class Baked:
 
 
 def headings(manifest: Mapping[str, Any]) -> tuple[str, ...]:
-    """The headings of the columns of `rows`."""
+    """The column headings of `rows`."""
     return ("table", "shape", "max error", "rms", "between", *_more(manifest))
 
 
@@ -60,7 +60,7 @@ def title(manifest: Mapping[str, Any]) -> str:
 
 
 def rows(manifest: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """For each table: its name, its shape along named axes and its errors, in the columns of `headings`."""
+    """For each table, its name, its shape along named axes and its errors, in the columns of `headings`."""
     tables, more = [], _more(manifest)
     for name, shape in manifest["tables"].items():
         error = manifest["error"].get(name, {})
@@ -82,7 +82,7 @@ def read(path: Path) -> Baked:
         text, seal = str(arrays.pop("manifest")), str(arrays.pop("seal"))
         manifest = json.loads(text)
         hashes = dict(manifest["hash"])
-    except Exception as error:  # any content may raise any exception
+    except Exception as error:  # invalid content may raise any exception
         raise ValueError("damaged, or not written by gonio bake") from error
     altered = ["manifest"] if seal != _seal(text) else []
     altered += [name for name, value in hashes.items() if name not in arrays or content_hash(arrays[name]) != value]

@@ -4,10 +4,11 @@ error.
     P(x, y) / Q(x, y),  with polynomials P and Q of a given total degree, Q(0, 0) = 1
 
     x is the roughness or its square, alpha; y is the cosine, its root, sqrt(mu / (mu + 4 alpha)) or
-    sqrt(mu^2 + alpha^2), in which E and B / E of microfacet models are smooth. The variables that fit best are used.
+    sqrt(mu^2 + alpha^2), in which E and B / E of microfacet models are smooth. The variables with the smallest error
+    are used.
 
-Each step solves a linear problem weighted by the last denominator (Sanathanan and Koerner), and the weights increase
-where the error is large (Lawson), so that the maximum error approaches the smallest possible.
+Each step solves a linear problem weighted by the denominator of the previous step (Sanathanan and Koerner), and the
+weights increase where the error is large (Lawson), so that the maximum error approaches its minimum.
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ from .target import Target
 
 Array: TypeAlias = NDArray[np.float64]
 
-LEAST_ROUGHNESS, LEAST_COSINE = 0.045, 0.02  # below these, the albedo has a knee that a short formula cannot follow
+LEAST_ROUGHNESS, LEAST_COSINE = 0.045, 0.02  # below them, the albedo has a knee that a short formula cannot reproduce
 ROWS, COLUMNS = 17, 33
 LARGEST_ORDER = 8
 STEPS = 30
-SAMPLES = 1 << 14  # for an albedo that only sampling gives at each roughness
+SAMPLES = 1 << 14  # for an albedo that can only be estimated by sampling at each roughness
 
 
 class Rational(NamedTuple):
@@ -58,7 +59,7 @@ class Rational(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """A quantity of a material as code: one rational function per channel, or a single one.
+    """A quantity of a material that is written as code: one rational function per channel, or one for all channels.
 
     name, doc  name and description of the function
     angle      whether it depends on the cosine
@@ -75,12 +76,13 @@ class Curve(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The largest error on the grid, over all components; for A and B, a bound, the sum of the two errors."""
+        """The largest error on the grid over all components; for A and B, a bound, which is the sum of the two
+        errors."""
         return self._all([part.error for part in self.parts])
 
     @property
     def mean(self) -> float:
-        """The mean error on the grid, for the worst component; for A and B, a bound."""
+        """The mean error on the grid for the component with the largest error; for A and B, a bound."""
         return self._all([part.mean for part in self.parts])
 
     def _all(self, errors: list[float]) -> float:
@@ -105,7 +107,7 @@ class Samples(NamedTuple):
     """Values on the grid of a fit.
 
     roughness, mu  the grid; roughness has a single entry if the material has no such parameter
-    swept          whether the material has a parameter that the roughness sets
+    swept          whether the material has a parameter that depends on the roughness
     values         name -> values (rows, columns, channels)
     """
 
@@ -118,7 +120,7 @@ class Samples(NamedTuple):
 def sample(model: BSDF, names: tuple[str, ...] = ("albedo", "average_albedo", "dfg")) -> Samples:
     """Sample a material on the grid of roughness and cosine.
 
-    names  quantities: "albedo" (E), "average_albedo" (E_avg), and for a microsurface "dfg" (A and B of the split sum)
+    names  quantities: "albedo" (E), "average_albedo" (E_avg) and, for a microsurface, "dfg" (A and B of the split sum)
     """
     path = next(ltc.roughness_paths(model), "")
     roughness = np.maximum(np.linspace(0.0, 1.0, ROWS), LEAST_ROUGHNESS) if path else np.zeros(1)
@@ -148,9 +150,9 @@ def _albedos(model: BSDF, path: str, roughness: Array, mu: Array) -> Array:
 
 
 DOCS = {
-    "albedo": "Directional albedo: the part of the light toward a cosine that is scattered.",
-    "average_albedo": "Its mean under uniform illumination.",
-    "dfg": "A, B of the split sum: the albedo is F0 A + B for Schlick's Fresnel (Karis2013).",
+    "albedo": "Directional albedo: the fraction of the light from a direction that is scattered.",
+    "average_albedo": "The albedo under uniform illumination.",
+    "dfg": "A and B of the split sum: for Schlick's Fresnel term, the albedo is F0 A + B (Karis2013).",
 }
 
 
@@ -186,7 +188,7 @@ def variables(form: tuple[str, str], roughness: Any, mu: Any) -> tuple[Any, Any]
 
 
 def _best(roughness: Array, mu: Array, values: Array, above: int, below: int) -> Rational:
-    """The rational function in the variables that fit best."""
+    """The rational function in the variables with the smallest error."""
     forms = product(
         ("roughness", "alpha")[: len(roughness)],
         ("mu", "root", "bent", "soft")[: 4 if len(roughness) > 1 < len(mu) else len(mu)],
@@ -206,7 +208,7 @@ def _fitted(roughness: Array, mu: Array, values: Array, above: int, below: int, 
     last, weight, ridge = np.ones(len(values)), np.ones(len(values)), 1e-6
     best, error, mean = np.zeros(len(up) + len(down)), np.inf, np.inf
     system = np.concatenate([tops, -values[:, None] * bottoms[:, 1:]], axis=1)
-    # with columns made orthogonal once, the normal equations of every step are well conditioned
+    # because the columns are orthogonalized once, the normal equations of every step are well conditioned
     z, r = np.linalg.qr(system)
     back = np.linalg.inv(r + 1e-13 * np.eye(len(r)))
     damped = back[len(up) :].T @ back[len(up) :]  # keeps Q near 1
@@ -236,7 +238,7 @@ def _powers(degree: int, rows: bool, columns: bool) -> list[tuple[int, int]]:
 def _array(powers: list[tuple[int, int]], numbers: Array) -> Array:
     made = np.zeros([max(p[axis] for p in powers) + 1 for axis in (0, 1)])
     for place, number in zip(powers, numbers, strict=True):
-        made[place] = float(np.float32(number))  # as in a shader
+        made[place] = float(np.float32(number))  # rounded as in a shader
     return made
 
 

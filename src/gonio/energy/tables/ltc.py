@@ -2,14 +2,14 @@
 
     D(i) = cos+(W i) |det W| / (pi |W i|^3),   W = [[a, 0, b], [0, 1, 0], [c, 0, d]]  in the plane of o and n
 
-W minimizes int |f |cos| / E - D|^p di over the whole sphere, including directions below the horizon, where f is 0 and D
-may not be. The fit uses p = 3, as in the paper, then p = 1.5, starting from the previous result, then p = 1.1: the
-error of an integral over a light is at most the fraction of the light that D misplaces, which p = 1 minimizes, whereas
-p = 3 fits the peak of a lobe at the cost of its tail. Where the horizon cuts a lobe in half, p = 1.5 misplaces up to an
-eighth more of the light than p = 1.1. The integral is a sum over fixed points: directions that the material samples,
-their mirror images at the horizon, and evenly spread directions. All cosines of a roughness are fitted at once by
-damped Gauss-Newton steps (Levenberg and Marquardt) from two starts: the fit of the rougher row, and the covariance of
-the lobe.
+W minimizes int |f |cos| / E - D|^p di over the whole sphere, including directions below the horizon, where f is 0 but D
+may be positive. The fit uses p = 3, as in the paper, and continues from the result with p = 1.5 and then p = 1.1: the
+error of an integral over a light is at most the fraction of the light that D sends in wrong directions, which p = 1
+minimizes, whereas p = 3 fits the peak of a lobe at the cost of its tail. Where the horizon cuts a lobe in half, this
+fraction is up to an eighth larger with p = 1.5 than with p = 1.1. The integral is a sum over fixed points: directions
+sampled from the material, their mirror images at the horizon, and evenly distributed directions. All cosines of a
+roughness are fitted at once by damped Gauss-Newton steps (Levenberg and Marquardt) from two starting points: the fit of
+the rougher row, and the covariance of the lobe.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ SIZE = 64
 MIN_ROUGHNESS = 0.0142  # alpha 2e-4: narrower lobes are mirrors, whose W is singular
 MIN_COSINE = 1e-3
 LOBE, SPHERE = 768, 384  # points per cell
-FINER = 24  # times as many points for the integrals over polygons
+FINER = 24  # factor by which the integrals over polygons use more points
 STEPS = 30
-POWERS = (3.0, 1.5, 1.1)  # of |f - D|, in order: 3, the paper's, converges from afar and fits the peak; 1 fits the tail
-SMALL = 1e-3  # of the lobe's peak: smaller differences gain no further weight
+POWERS = (3.0, 1.5, 1.1)  # powers of |f - D|: 3, as in the paper, always converges and fits the peak; 1 fits the tail
+SMALL = 1e-3  # fraction of the lobe's peak below which the weight of a difference no longer increases
 POLYGONS = 1024
 
 
 class Row(NamedTuple):
-    """A row of the table: the numbers of W, E in color, and the errors of each cell.
+    """A row of the table: the entries of W, E per color channel, and the errors of each cell.
 
     inverse    the numbers a, b, the middle entry, c, d of W, (size, 5)
-    norm       E, (size, channels); for a distribution (E, B), so that the albedo is F0 (E - B) + B by Schlick's F
-    misplaced  half of int |f cos / E - D|, the fraction of the light that is misplaced, (size,)
+    norm       E, (size, channels); for a distribution, (E, B): the albedo with Schlick's F is F0 (E - B) + B
+    misplaced  half of int |f cos / E - D|, the fraction of the light that D sends in wrong directions, (size,)
     cubed      int |f cos - E D|^3, which the paper minimizes, (size,)
     """
 
@@ -91,7 +91,7 @@ def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
     """Bake tables of an isotropic material over (roughness, sqrt(1 - mu)), with nodes at both ends.
 
     size     number of nodes along each axis, 2 to 256
-    schlick  whether to store E and B instead of E in color, for a material with F = 1
+    schlick  whether to store E and B instead of E per color channel, for a material with F = 1
     Returns arrays ltc_inverse (..., 4), ltc_norm (..., 2 or 3), ltc_error (..., 1); the manifest states the mean and
     the largest error of the lobe and of integrals over random quadrilaterals. Tables of a material without a roughness
     have one row. Raises InputError if the material has a mirror lobe, is evaluated by random estimates or absorbs all
@@ -126,13 +126,13 @@ def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
 
 
 def cosines(size: int) -> Array:
-    """The cosine of each column; the last is just above the horizon."""
+    """The cosine of each column; the direction of the last one is just above the horizon."""
     return np.maximum(1.0 - np.linspace(0.0, 1.0, size) ** 2, MIN_COSINE)
 
 
 def check(model: BSDF, size: int) -> str:
-    """The path of the parameter that the roughness sets; "" if there is none. Raises InputError if the material or the
-    size is not supported."""
+    """The path of the parameter that depends on the roughness; "" if there is none. Raises InputError if the material
+    or the size is not supported."""
     check_uniform(model)
     kind = type(model).__name__
     if not 2 <= size <= 256:
@@ -145,7 +145,7 @@ def check(model: BSDF, size: int) -> str:
 
 
 def roughness_paths(model: BSDF) -> Iterator[str]:
-    """Paths of the parameters that a roughness can set, widths first."""
+    """Paths of the parameters that can depend on a roughness, alphas first."""
     leaves = list(tree.leaves(model))
     yield from (leaf.path for leaf in leaves if leaf.parameter.kind == "alpha")
     for name in ("roughness", "specular_roughness"):
@@ -153,7 +153,7 @@ def roughness_paths(model: BSDF) -> Iterator[str]:
 
 
 def at(model: BSDF, path: str, roughness: float) -> BSDF:
-    """The material at a roughness, of which a width is the square.
+    """The material at a roughness, whose square is alpha.
 
     path  path of the parameter to set, from `check`; "" changes nothing
     """
@@ -170,7 +170,7 @@ def at(model: BSDF, path: str, roughness: float) -> BSDF:
 def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE, phi: Array | None = None) -> Points:
     """The points of the integrals over a lobe and its surroundings, for each cosine of wo.
 
-    lobe, sphere  numbers of directions that the material samples, and of evenly spread ones
+    lobe, sphere  numbers of directions sampled from the material, and of evenly distributed directions
     phi           azimuths of wo; None for 0
     """
     kind = backend.types("float64")
@@ -179,7 +179,7 @@ def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE, ph
     u = np.tile(r_sequence(lobe, 3, 0.5), (cells, 1))
     sampled = bound.sample(kind.vec3(np.repeat(wo, lobe, 0).T), kind.vec3(u.T), "importance")
     near = np.array(sampled.wi, float).T.reshape(cells, lobe, 3)
-    lost = near[..., 2] <= 0.0  # transmitted, or without a value: a direction that f does not need
+    lost = near[..., 2] <= 0.0  # transmitted, or without a value: not needed for f
     flat = r_sequence(sphere, 3, 0.5)
     z = 2.0 * flat[:, 0] - 1.0
     even = spherical_array(np.sqrt(1.0 - z**2), z, 2.0 * np.pi * flat[:, 1])
@@ -199,7 +199,7 @@ def points_of(model: BSDF, mu: Array, lobe: int = LOBE, sphere: int = SPHERE, ph
 
 
 def _norm(model: BSDF, mu: Array, schlick: bool) -> Array:
-    """E of the reflected light in color at each cosine; with `schlick`, E at F = 1 and B."""
+    """E of the reflected light per color channel at each cosine; with `schlick`, E at F = 1 and B."""
     surface = model.microsurface
     if schlick and surface is not None:
         x, _ = pair_of(surface.alpha)
@@ -233,7 +233,7 @@ def _row(model: BSDF, mu: Array, start: Array | None, schlick: bool) -> Row:
 
 
 def _fit(given: tuple[Array, Array, Array], starts: list[Array], power: float) -> Array:
-    """W of each cell for a power p: the best result from any of the starts or from the fits of neighboring cells."""
+    """W of each cell for a power p: the best result of all starting points, including the fits of neighboring cells."""
     losses = [loss_of(PLANE, start, *given, power) for start in starts]
     chosen = np.argmin(losses, axis=0)
     best, loss = fitted(PLANE, *given, np.array(starts)[chosen, np.arange(len(chosen))], power)
@@ -321,10 +321,10 @@ def loss_of(form: Form, inverse: Array, wi: Array, weight: Array, lobe: Array, p
 
 
 def fitted(form: Form, wi: Array, weight: Array, lobe: Array, start: Array, power: float = 3.0) -> tuple[Array, Array]:
-    """W and the loss of each cell after damped Gauss-Newton steps from a start.
+    """W and the loss of each cell after damped Gauss-Newton steps from a starting point.
 
     lobe   values of the normalized lobe, f |cos| / E
-    power  power of |f - D| in the integral; below 2, the steps give small differences more weight, up to a bound
+    power  power of |f - D| in the integral; below 2, small differences have a larger weight in the steps, up to a bound
            (`SMALL`)
     """
     inverse, damping = start.copy(), np.full(len(start), 1e-2)
@@ -357,8 +357,8 @@ def fitted(form: Form, wi: Array, weight: Array, lobe: Array, start: Array, powe
 
 
 def polygon_errors(model: BSDF, path: str, roughness: Array, mu: Array, inverse: Array) -> Array:
-    """The errors of integrals over random quadrilaterals, computed by the tables instead of by summing f, divided by E,
-    at up to 8 x 8 cells."""
+    """The errors of integrals over random quadrilaterals that are computed from the tables, relative to sums of f,
+    divided by E, at up to 8 x 8 cells."""
     rows, columns = (np.unique(np.linspace(0, n - 1, 8).round().astype(int)) for n in (len(roughness), len(mu)))
     each = max(POLYGONS // (len(rows) * len(columns)), 1)
     corners = random_quads(np.random.default_rng(1), each * len(rows) * len(columns))

@@ -3,9 +3,9 @@
     D(i) = cos+(W i) |det W| / (pi |W i|^3)
 
 The material is symmetric about the planes of its axes, so azimuths in one quarter turn suffice. W acts in the frame
-whose x axis lies below o. D is the same for a multiple of W and for W rotated about the axis of the cosine; the table
-stores the matrix whose upper left block is symmetric and whose middle entry is 1, so that neighbors can be
-interpolated. The fit is that of `ltc`, with nine numbers.
+whose x axis lies below o. D does not change if W is multiplied by a number or rotated about the axis of the cosine
+lobe; the table stores the matrix whose upper left block is symmetric and whose center entry is 1, so that neighbors can
+be interpolated. The fit is that of `ltc`, with nine numbers.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from .ltc import Array, Form, Points
 from .target import describe
 
 SIZE = 16
-AZIMUTHS = 9  # from 0 to pi / 2
-PLACES = 64  # points at which `polygon_errors` tests 16 quadrilaterals each
+AZIMUTHS = 9  # number of azimuths from 0 to pi / 2
+PLACES = 64  # number of points at which `polygon_errors` tests 16 quadrilaterals each
 
 
 def bake(model: BSDF, size: int = SIZE, schlick: bool = False) -> Baked:
     """Bake tables over (roughness, azimuth, sqrt(1 - mu)), with nodes at both ends, as `ltc.bake` but with eight
     numbers of W.
 
-    The roughness is the root of the larger width; the ratio of the widths is that of the material. Arguments as for
-    `ltc.bake`. Raises InputError if the x and y axes are not axes of symmetry, and in the cases of `ltc.bake`.
+    The roughness is the root of the larger alpha; the ratio of the alphas is that of the material. The arguments are
+    those of `ltc.bake`. Raises InputError if the x and y axes are not axes of symmetry, and in the cases of `ltc.bake`.
     """
     path = ltc.check(model, size)
     _check_symmetry(model)
@@ -74,7 +74,7 @@ def _errors(values: Array) -> dict[str, float]:
 
 
 def at(model: BSDF, path: str, roughness: float) -> BSDF:
-    """The material at a roughness, which sets its widths, in their ratio, or the parameter at `path`."""
+    """The material at a roughness, which sets the alphas, with their ratio unchanged, or the parameter at `path`."""
     leaf = next((leaf for leaf in tree.leaves(model) if leaf.path == path), None)
     if leaf is None or leaf.parameter.kind != "alpha":
         return ltc.at(model, path, roughness)
@@ -102,8 +102,8 @@ def _check_symmetry(model: BSDF) -> None:
 
 
 def _row(model: BSDF, mu: Array, phi: Array, start: Array | None, schlick: bool) -> tuple[Array, Array, Array, Array]:
-    """W (azimuths, cosines, 9), E, the misplaced light and the cubed error of the fit, as in `ltc.Row`, for one
-    roughness."""
+    """For one roughness, W (azimuths, cosines, 9), E, the fraction of misplaced light, and the cubed error of the fit,
+    as in `ltc.Row`."""
     shape = len(phi), len(mu)
     across, azimuths = np.tile(mu, len(phi)), np.repeat(phi, len(mu))
     points = ltc.points_of(model, across, phi=azimuths)
@@ -119,7 +119,7 @@ def _row(model: BSDF, mu: Array, phi: Array, start: Array | None, schlick: bool)
         better = ltc.loss_of(MATRIX, start, *parts) < ltc.loss_of(MATRIX, best, *parts)
         best = np.where(better[:, None], start, best)
     best, loss = ltc.fitted(MATRIX, *parts, best)
-    for axis in (0, 1):  # the fits of the neighbors, if they are better
+    for axis in (0, 1):  # use the fits of the neighbors where they are better
         for side in (1, -1):
             other = np.roll(best.reshape(*shape, 9), side, axis).reshape(-1, 9)
             cells = np.flatnonzero(ltc.loss_of(MATRIX, other, *parts) < loss)
@@ -131,7 +131,7 @@ def _row(model: BSDF, mu: Array, phi: Array, start: Array | None, schlick: bool)
 
 
 def _norm(model: BSDF, points: Points, mu: Array, phi: Array, schlick: bool) -> Array:
-    """E in color at each cell; with `schlick`, E at F = 1 and B."""
+    """E per color channel at each cell; with `schlick`, E at F = 1 and B."""
     if schlick:
         wo = direction(mu, phi)[:, None]
         half = wo + points.wi
@@ -162,7 +162,7 @@ def _first(points: Points, lobe: Array) -> Array:
     squares = np.einsum("ck,cki,ckj->cij", weight, local, local)
     sizes, axes = np.linalg.eigh(2.0 * squares[:, :2, :2] / squares[:, 2:, 2:])
     over = 1.0 / np.sqrt(np.maximum(sizes, 1e-12))
-    upper = (axes * over[:, None]) @ np.swapaxes(axes, 1, 2) @ frame[:, :2]  # a cosine lobe has sizes of 1
+    upper = (axes * over[:, None]) @ np.swapaxes(axes, 1, 2) @ frame[:, :2]  # for a cosine lobe, the sizes are 1
     return np.concatenate([upper, frame[:, 2:]], axis=1).reshape(-1, 9)
 
 
@@ -196,7 +196,7 @@ MATRIX = Form(_density, _slopes, _mirrored)
 
 
 def _gauge(matrix: Array) -> Array:
-    """Matrices of the same lobes with a symmetric upper left block and a middle entry of 1."""
+    """Matrices of the same lobes with a symmetric upper left block and a center entry of 1."""
     turn = np.arctan2(matrix[:, 0, 1] - matrix[:, 1, 0], matrix[:, 0, 0] + matrix[:, 1, 1])
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
     upper = np.stack([c * matrix[:, 0] - s * matrix[:, 1], s * matrix[:, 0] + c * matrix[:, 1]], axis=1)
@@ -208,8 +208,8 @@ def _gauge(matrix: Array) -> Array:
 
 
 def polygon_errors(model: BSDF, path: str, inverse: Array) -> Array:
-    """The errors of integrals over random quadrilaterals, computed by the interpolated table instead of by summing f,
-    divided by E, at random points of the table."""
+    """The errors of integrals over random quadrilaterals that are computed from the interpolated table, relative to
+    sums of f, divided by E, at random points of the table."""
     random = np.random.default_rng(1)
     each = ltc.POLYGONS // PLACES
     corners = ltc.random_quads(random, each * PLACES)
@@ -228,7 +228,7 @@ def polygon_errors(model: BSDF, path: str, inverse: Array) -> Array:
 
 
 def covered(inverse: Array, roughness: Array, wo: Array, corners: Array) -> Array:
-    """The fraction of the lobe for wo (N, 3) that a quadrilateral (N, 4, 3) covers, by the table as in shaders."""
+    """The fraction of the lobe for wo (N, 3) that a quadrilateral (N, 4, 3) covers, from the table as in shaders."""
     kind = backend.types("float64")
     table, outgoing = Table("ltc_inverse", inverse), kind.vec3(wo.T)
     points: Any = tuple(kind.vec3(corners[:, i].T) for i in range(4))

@@ -1,16 +1,16 @@
 """Prefilter an environment for rough mirrors: the levels of the split sum (Karis2013).
 
     light reflected at o ~ E(o) L_alpha(r),   L_alpha(r) = int L(i) k(r.i) di / int k(r.i) di,   r = o mirrored at n,
-    k(z) = max(z, 0) D(m),   m halfway between r and i: the lobe at normal incidence, o = n = r, weighted by i.n.
+    k(z) = max(z, 0) D(m),   m is the half vector of r and i: the lobe at normal incidence, o = n = r, weighted by i.n.
 
 **The method.** The kernel depends only on the angle between r and i. Between two circles of latitude, the integral is
 therefore a convolution in azimuth, a product of Fourier series; the latitudes are summed directly. Every texel
-contributes and nothing is sampled, so a small sun causes neither noise nor blotches. Where a lobe is many texels wide,
-the map is first averaged in blocks; where it is narrower than a few texels, the map is interpolated.
+contributes, and no samples are used, so a small sun causes neither noise nor blotches. If a lobe is many texels wide,
+the map is first averaged in blocks; if it is narrower than a few texels, the map is interpolated.
 
-**Two errors.** The error of the blur (of each level compared with a sum over every finely divided texel of the map) is
-invisible. The error of the split sum itself is visible, since it assumes a circular lobe, cut by the horizon, with
-uniform masking. The manifest states both errors for the environment.
+**Two errors.** The error of the blur, measured for each level by a sum over all finely divided texels of the map, is
+invisible. The error of the split sum itself is visible, because the split sum assumes a circular lobe with uniform
+masking. The manifest states both errors for the environment.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ Array: TypeAlias = NDArray[np.float64]
 Environment: TypeAlias = NDArray[np.floating]
 
 LEVELS = 6
-MAX_LEVELS = 10  # lobes narrower than (1 / 9)^2 would need grids of several thousand rows
+MAX_LEVELS = 10  # lobes with alpha below (1 / 9)^2 would need grids of several thousand rows
 MIN_ROWS, MAX_ROWS = 4, 4096  # rows of the map
 STEPS = 8.0  # rows of the grid per half width of a lobe
-MIN_GRID = 128  # smallest number of rows: the error of the blur is then about 1e-3 at most
+MIN_GRID = 128  # smallest number of rows, for which the error of the blur is at most about 1e-3
 JUDGE_STEPS, JUDGE_ROWS = 16.0, 256
-COSINES = (1.0, 0.7, 0.3)  # n.o at which the error of the split sum is measured
+COSINES = (1.0, 0.7, 0.3)  # values of n.o at which the error of the split sum is measured
 _LANES = 1 << 22  # points evaluated at once: 32 MiB per array
 SCHEMA = 2
 
@@ -60,7 +60,7 @@ def prefilter(
     ndf          name of the distribution of normals
     levels       number of levels, 2 or more
     location     the name of the environment, for errors
-    Level l is for roughness l / (levels - 1); its texels are ordered as those of the map.
+    Level l is for roughness l / (levels - 1); its texels have the same order as those of the map.
     Raises InputError for a map of another shape, with negative or non-finite values, or too small for this many levels,
     and for an unknown distribution.
     """
@@ -76,8 +76,8 @@ def bake(
     """Bake the levels of `prefilter` as arrays level_0, level_1, ..., rounded to float32. The manifest states their
     errors.
 
-    masking  masking term, for the error of the split sum
-    name     name of the environment, for the manifest and errors
+    masking  masking term that is used for the error of the split sum
+    name     name of the environment, for the manifest and for errors
     """
     quadrature.known_masking(masking)
     made = prefilter(environment, ndf, levels, name)
@@ -103,7 +103,7 @@ def bake(
             "split sum": f"E(mu) L(r) against the integral itself at F = 1, mu = {', '.join(map(str, COSINES))}",
         },
         "texels": "linear between texels and between levels",
-        "errors are": "in units of the root mean square of what is right, over the directions judged",
+        "errors are": "relative to the root mean square of the correct values, over the tested directions",
         "dims": {key: ["theta", "phi"] for key in arrays},
         "tables": {key: [*array.shape] for key, array in arrays.items()},
         "error": errors(made, ndf, masking),
@@ -163,8 +163,8 @@ def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
     height, width = source.shape[0] >> level, 2 * (source.shape[0] >> level)
     theta_i, theta_o = _centers(rows), _centers(height)
 
-    # c_m of every row, for azimuths starting at 0 although the first texel's center is half a texel further on; they
-    # are evaluated at the level's texels, times solid angle. North and south are mirror images for the kernel: the
+    # c_m of every row, times solid angle, for azimuths that start at 0, although the center of the first texel is half
+    # a texel further on; they are evaluated at the level's texels. The kernel is symmetric about the equator: the
     # southern half of the level is the northern half for the flipped map.
     order = np.arange(columns // 2)
     turn = np.exp(1j * np.pi * order * (1.0 / width - 1.0 / columns))
@@ -185,7 +185,7 @@ def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
         result[start : start + len(theta)] = values[..., :channels]
         for row, mirrored in enumerate(values[..., channels:]):
             result[height - 1 - start - row] = mirrored
-    return np.maximum(result, 0.0)  # rounding may give values below 0
+    return np.maximum(result, 0.0)  # rounding may cause values below 0
 
 
 def _at_centers(series: NDArray[np.complex128], width: int) -> Array:
@@ -206,7 +206,8 @@ def _resampled(source: Array, wanted: float) -> Array:
 
 
 def _divided(source: Array, parts: int) -> Array:
-    """The map with every texel divided into parts x parts, interpolated between the centers as in renderers."""
+    """The map with every texel divided into parts x parts, with the interpolation between texel centers that renderers
+    use."""
     if parts <= 1:
         return source
     height, width = source.shape[:2]
@@ -259,8 +260,8 @@ def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, f
     texels and halfway to the previous level; `split sum`, the RMS error of the split sum. All are relative to the RMS
     of the exact values.
 
-    They are computed by sums over every texel of the map, in eight evenly spread directions and at the brightest texel
-    of the level.
+    They are computed by sums over every texel of the map, in eight evenly distributed directions and at the brightest
+    texel of the level.
     """
     lobe, source = distribution(ndf), levels[0]
     spread = _spread(8)
@@ -292,7 +293,7 @@ def _figures(difference: Array, right: Array) -> dict[str, float]:
 
 
 class EveryTexel:
-    """Every texel of a map, divided finely enough for a lobe: the reference for levels, without Fourier series."""
+    """All texels of a map, divided finely enough for a lobe, as a reference for the levels without Fourier series."""
 
     def __init__(self, source: Array, alpha: float, steps: float = JUDGE_STEPS) -> None:
         self.alpha = alpha
@@ -322,7 +323,7 @@ class EveryTexel:
             yield weight @ power, float(weight @ solid)
 
     def blurred(self, lobe: NDF, n: Array) -> Array:
-        """L_alpha(n), directly from its definition."""
+        """L_alpha(n), computed directly from its definition."""
 
         def value(i: Direction, alpha: Scalar) -> Scalar:
             m = normalize(vec3(i.x, i.y, i.z + 1.0))
@@ -356,7 +357,7 @@ def _frame(n: Array) -> Array:
 
 
 def _mirrored(r: Array, mu: float) -> tuple[Array, Array]:
-    """o and n with mirror direction r and o.n = mu, in an arbitrary plane through r."""
+    """o and n for which r is the mirror direction and o.n = mu, in an arbitrary plane through r."""
     n = mu * r + np.sqrt(1.0 - mu * mu) * _frame(r)[0]
     return 2.0 * mu * n - r, n
 
@@ -370,7 +371,7 @@ def _of_texels(level: Array, start: int = 0, stop: int | None = None) -> Array:
 
 
 def _spread(count: int) -> Array:
-    """Directions spread evenly over the sphere, none at a pole: a spiral in golden-angle steps."""
+    """Directions distributed evenly over the sphere, none of them at a pole: a spiral in golden-angle steps."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     phi = np.arange(count) * np.pi * (3.0 - np.sqrt(5.0))
     sine = np.sqrt(1.0 - z * z)

@@ -1,4 +1,4 @@
-"""The split sum of image-based lighting (Karis2013): E = F0 A + B for Schlick's Fresnel. `prefilter` makes the maps.
+"""The split sum of image-based lighting (Karis2013): E = F0 A + B for Schlick's F. `prefilter` computes the maps.
 
     light reflected ~ (F0 A(mu, roughness) + B(mu, roughness)) * prefiltered radiance (reflected direction, roughness)
 

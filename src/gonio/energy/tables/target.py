@@ -1,4 +1,4 @@
-"""The target of a baked table: its E at points of the axes and its E_avg, which are computed in parts."""
+"""The target of a baked table, with its E at points of the axes and its E_avg, which are computed in parts."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..albedo import quadrature
 from ..albedo.quadrature import Points
 from .axes import Axes
 
-BLOCK = 1024  # points per part: about 0.1 s, and 1 s with the reference quadrature
+BLOCK = 1024  # points per part; a part takes about 0.1 s, and 1 s with the reference quadrature
 
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """A target baked over roughness: a distribution at F = 1, or a Conductor or Dielectric.
+    """A target whose tables have an axis for roughness: a distribution at F = 1, or a Conductor or Dielectric.
 
     model         the material; None for a distribution
     ndf, masking  names of the distribution and the masking term
@@ -30,7 +30,7 @@ class Target:
     masking: str
 
     def exact(self, points: Points, fine: bool = False) -> dict[str, np.ndarray]:
-        """E, and for a distribution also dfg, at points by quadrature, computed in parts.
+        """E at points and, for a distribution, dfg, computed by quadrature in parts.
 
         fine  whether to use the finer quadrature, which is the reference for errors
         """
@@ -59,18 +59,18 @@ class Target:
 
     @property
     def conducts(self) -> bool:
-        """Whether it is a metal; other targets have an index that can vary along an axis."""
+        """Whether the target is a metal; other targets have an index that can vary along an axis."""
         return self.model is not None and self.model.microsurface.eta is None
 
     def average(self, axes: Axes, rows: np.ndarray, fine: bool = False) -> np.ndarray:
-        """E_avg at rows of roughness, by a Gauss-Legendre rule in sqrt(mu) and even steps of azimuth in a quarter
+        """E_avg at rows of roughness, by a Gauss-Legendre rule in sqrt(mu) and equal steps of azimuth in a quarter
         turn."""
         x, w = quadrature.gauss(48 if fine else 32)
         roughness = axes.roughness(rows)
         if not axes.azimuths:
             mu, alpha = np.broadcast_arrays(x**2, roughness[:, None] ** 2)
             return np.einsum("rm...,m->r...", self.exact(Points(mu, alpha, None, 0.0), fine)["E"], 4.0 * w * x**3)
-        # even steps of the mean of the azimuths of directions and of their slopes: covers both ends
+        # equal steps of the mean of the azimuths of directions and of their slopes, so that both ends are resolved
         turn = (np.arange(count := 48 if fine else 24) + 0.5) / count * 0.5 * np.pi
         k = np.sqrt(axes.aspect)
         phi = np.arctan2(np.sin(turn), k * np.cos(turn))[:, None, None]
@@ -95,7 +95,7 @@ def _exact(
 def glass_power(
     ndf: str, masking: str, fresnel: str, mu: np.ndarray, alpha: np.ndarray, eta: np.ndarray, fine: bool
 ) -> dict[str, np.ndarray]:
-    """One part of `_glass`: reflected and transmitted power."""
+    """One part of `_glass`: the reflected and the transmitted power."""
     nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
     return {"power": np.stack(quadrature.glass(ndf, masking, fresnel, Points(mu, alpha), eta, nodes), -1)}
 

@@ -1,7 +1,11 @@
-"""Materials measured from photographs of a ball, or of a flat sample, under a lamp in several places (Marschner1999).
+"""Measure materials from photographs of a ball or a flat sample, lit by a lamp at several positions (Marschner1999).
 
-`calibration` (the file with camera, sample and lamps), `photographs` (files to radiance), `geometry` (the point and
-directions of each pixel), `pixels` (usable pixels, and BRDF samples from them), `fitting` (a material together with the
-errors of the calibration), `planning` (which photograph to take next), `rehearsal` (photographs that Gonio renders),
-`run` (the whole procedure).
+calibration  the calibration file: camera, sample and lamps
+photographs  conversion of files to radiance
+geometry     the point and the directions at each pixel
+pixels       selection of usable pixels, and conversion to BRDF samples
+fitting      a fit of the material together with the errors of the calibration
+planning     choice of the next photograph to take
+rehearsal    renders of the photographs
+run          the complete procedure
 """

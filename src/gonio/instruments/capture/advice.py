@@ -12,14 +12,14 @@ from . import pixels
 from .fitting import Fitted
 from .pixels import Chosen, Scene
 
-NARROW = 5.0  # degrees: a smaller range of difference angles does not determine the Fresnel term
-HIGHLIGHT = 4.0  # degrees of the half vector within which the peak of a highlight lies
-CLIPPED = 0.02  # fraction of the lit pixels
-VAGUE = 0.25  # relative half width of an interval above which a parameter is reported as uncertain
-SMALL = 2.0  # smallest lobe width in pixels that is resolved
-FAR = 3.0  # standard deviations above which a calibration error exceeds its stated uncertainty
-ALIKE = 4.0  # pixels that count as one, above which noise alone does not explain the residuals
-WRONG = 0.05  # relative difference of model and pictures that is reported
+NARROW = 5.0  # degrees; a smaller range of difference angles does not determine the Fresnel term
+HIGHLIGHT = 4.0  # degrees; the peak of a highlight lies within this angle of the half vector from the normal
+CLIPPED = 0.02  # fraction of saturated pixels among the lit pixels above which a warning is issued
+VAGUE = 0.25  # relative half width of a confidence interval above which a parameter is reported as uncertain
+SMALL = 2.0  # smallest width of a lobe that is resolved, pixels
+FAR = 3.0  # number of standard deviations above which a calibration error exceeds its stated uncertainty
+ALIKE = 4.0  # number of pixels that count as one above which noise alone does not explain the residuals
+WRONG = 0.05  # relative difference between model and pictures above which it is reported
 
 
 def on(scene: Scene, chosen: Chosen, result: Fitted | None) -> tuple[str, ...]:
@@ -39,15 +39,15 @@ def _on_pictures(scene: Scene, chosen: Chosen) -> Iterator[str]:
     span = f"difference angles of {low:.0f} to {high:.0f} degrees"
     if len(scene.names) == 1:
         yield (
-            f"one light alone, {span}: one highlight determines roughness only if the model is right, and nothing "
-            "determines what depends on the angle (index, Fresnel)"
+            f"only one light, with {span}: one highlight determines the roughness only if the model is right, and the "
+            "index of refraction and the Fresnel term remain undetermined"
         )
     elif high - low < NARROW:
-        yield f"{span} only: they do not determine index and Fresnel"
+        yield f"{span} only: they do not determine the index of refraction and the Fresnel term"
     clipped, used = chosen.counts["saturated"], chosen.counts["used"]
     if nearest > HIGHLIGHT:
         why = ", which is saturated" if clipped else ""
-        yield f"no pixel within {nearest:.0f} degrees of the peak of a highlight{why}: roughness is poorly determined"
+        yield f"no pixel within {nearest:.0f} degrees of the peak of a highlight{why}: the roughness is uncertain"
     if clipped > CLIPPED * (clipped + used):
         yield f"{100.0 * clipped / (clipped + used):.0f} % of the lit pixels are saturated: add a shorter exposure"
 
@@ -56,17 +56,17 @@ def _on_fit(scene: Scene, result: Fitted) -> Iterator[str]:
     fit = result.fit
     for name, value, error in zip(fit.names, fit.values, fit.errors, strict=True):
         if np.isfinite(error) and NORMAL_95 * error > VAGUE * max(abs(value), 1e-3):
-            yield f"the pictures poorly determine {name}: {value:.3g} +- {NORMAL_95 * error:.2g}"
+            yield f"the pictures do not determine {name} well: {value:.3g} +- {NORMAL_95 * error:.2g}"
     yield from fit.notes
     if scene.ball is not None:
         pixel = scene.ball.pixel / scene.ball.radius
         for name, value in zip(fit.names, fit.values, strict=True):
             if name.rpartition(".")[2] == "alpha" and value < SMALL * pixel:
-                yield f"{name} = {value:.3g} is a highlight of {value / pixel:.1f} pixels: move the camera closer"
+                yield f"{name} = {value:.3g} gives a highlight of {value / pixel:.1f} pixels: move the camera closer"
     for name, (value, _) in result.faults.items():
         if abs(value) > FAR:
-            yield f"{name} is {abs(value):.1f} standard deviations from what the calibration says"
+            yield f"{name} is {abs(value):.1f} standard deviations from the value in the calibration"
     if result.problem.alike > ALIKE:
         yield "errors of neighboring pixels are correlated: the calibration or the model is wrong"
     if fit.relative > max(WRONG, 3.0 * result.noise):
-        yield f"the model is {100.0 * fit.relative:.0f} % off on average: its intervals are unreliable"
+        yield f"the model differs from the pictures by {100.0 * fit.relative:.0f} %: its intervals are unreliable"

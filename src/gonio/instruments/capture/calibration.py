@@ -1,8 +1,8 @@
-"""The calibration file: camera, ball, lamps and photographs, and the uncertainty of each.
+"""The calibration file: camera, sample, lamps and photographs, and their uncertainties.
 
-Everything is in the camera's frame: x to the right of the picture, y downward, z forward; lengths are in any unit, the
-same throughout. Pixel coordinates start at the picture's upper left corner; the center of its first pixel is at
-(0.5, 0.5).
+All coordinates are in the frame of the camera: x points to the right in the picture, y downward, and z forward. Lengths
+may be in any unit, which must be the same throughout. Pixel coordinates start at the upper left corner of the picture,
+so the center of the first pixel is at (0.5, 0.5).
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ class Camera(Part):
     focal: Positive
     """Focal length, in the unit of `pixel`."""
     pixel: Positive = 1.0
-    """Distance between two pixels on the sensor; if omitted, `focal` is in pixels."""
+    """Distance between adjacent pixels on the sensor; if omitted, `focal` is in pixels."""
     principal: Pair | None = None
-    """Point where the optical axis meets the picture, pixels; the center if omitted."""
+    """Point where the optical axis intersects the picture, pixels; the center of the picture if omitted."""
     k1: Number = 0.0
-    """Radial distortion: x' = x (1 + k1 r^2 + k2 r^4) with x, y divided by z (Brown1971, as in OpenCV)."""
+    """Radial distortion: x' = x (1 + k1 r^2 + k2 r^4), where x and y are divided by z (Brown1971, as in OpenCV)."""
     k2: Number = 0.0
 
     @property
@@ -53,12 +53,12 @@ class Camera(Part):
 
 
 class Ball(Part):
-    """A ball: its center is given, or its outline in the picture; without either, the outline is detected."""
+    """A ball, given by its center or by its outline in the picture. If both are omitted, the outline is detected."""
 
     radius: Positive
     center: Vector | None = None
     outline: tuple[Number, Number, Positive] | None = None
-    """[x, y, radius] of its outline, pixels."""
+    """[x, y, radius] of the outline, pixels."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Ball:
@@ -70,7 +70,7 @@ class Ball(Part):
 
 
 class Flat(Part):
-    """A flat sample: the parallelogram base + s edge0 + t edge1."""
+    """A flat sample: the parallelogram of points base + s edge0 + t edge1, with s and t from 0 to 1."""
 
     base: Vector
     edge0: Vector
@@ -85,26 +85,27 @@ class Flat(Part):
 
 
 class Reference(Flat):
-    """A flat white diffuse (Lambertian) target, from which the intensities of the lamps follow."""
+    """A flat white Lambertian target, from which the intensities of the lamps are determined."""
 
     albedo: Light
-    """Its reflectance, such as 0.99."""
+    """Diffuse reflectance of the target, such as 0.99."""
 
 
 class Lamp(Part):
-    """A lamp that is small compared with its distance."""
+    """A lamp whose size is small compared to its distance from the sample."""
 
     position: Vector | None = None
-    """Position of the lamp; if omitted, it is derived from the mirror balls."""
+    """Position of the lamp; if omitted, it is determined from the mirror balls."""
     distance: Positive | None = None
     """Distance from the center of the ball; required if there is only one mirror ball."""
     intensity: Light | None = None
-    """Radiant intensity, such that a photograph holds f cos theta_i intensity / distance^2 times seconds; a number or
-    [r, g, b]. If omitted, it is derived from a photograph of the reference."""
+    """Radiant intensity, a number or [r, g, b], in units such that a pixel has the value
+    f cos theta_i intensity / distance^2 times the exposure time in seconds. If omitted, it is determined from a
+    photograph of the reference."""
 
 
 class Exposure(Part):
-    """A picture and its exposure time; if `seconds` is omitted, it is read from the file itself."""
+    """A picture and its exposure time. If `seconds` is omitted, it is read from the picture file."""
 
     file: str = Field(min_length=1)
     seconds: Positive | None = None
@@ -117,7 +118,7 @@ class Shot(Part):
     seconds: Positive | None = None
     exposures: list[Exposure] = Field(default_factory=list)
     light: str = "lamp"
-    """Which of `lights` was on."""
+    """Name of the lamp in `lights` that was on."""
     sample: Literal["ball", "flat", "reference"] = "ball"
 
     @model_validator(mode="after")
@@ -132,17 +133,17 @@ class Shot(Part):
 
 
 class Uncertainty(Part):
-    """Standard deviations of the calibration. Omitted quantities count as exact; a detected outline has the uncertainty
-    of its detection."""
+    """Standard deviations of the calibration. Omitted quantities count as exact, but if the outline of the ball is
+    detected, its uncertainty is that of the detection."""
 
     light: NonNegative = 0.0
     """Standard deviation of a lamp's direction along each axis, degrees."""
     intensity: NonNegative = 0.0
     """Relative standard deviation of each lamp's intensity."""
     scale: NonNegative = 0.0
-    """Relative standard deviation of the scale of all intensities together."""
+    """Relative standard deviation of a scale factor common to all intensities."""
     seconds: NonNegative = 0.0
-    """Relative standard deviation of each exposure time: of a shutter setting, equal in all series."""
+    """Relative standard deviation of each exposure time. Its error is the same in all series with this setting."""
     center: NonNegative | None = None
     """Standard deviation of the ball's center along each axis, pixels."""
     radius: NonNegative | None = None
@@ -150,14 +151,14 @@ class Uncertainty(Part):
 
 
 class Calibration(Part):
-    """The arrangement in which the photographs were taken, and its uncertainty."""
+    """The setup with which the photographs were taken, and its uncertainty."""
 
     camera: Camera
     response: Literal["linear", "srgb"] | list[Pair] = "linear"
-    """How an integer file stores light: linearly, as sRGB, or by a curve of [value, light] pairs from [0, 0] to [1, 1].
-    Floating-point files are linear."""
+    """Response of files with integer values: linear, sRGB, or a curve of [value, light] pairs from [0, 0] to [1, 1].
+    Files with floating-point values are linear."""
     saturation: Annotated[Number, Field(gt=0, le=1)] = 0.99
-    """Value at and above which an integer file is saturated."""
+    """Value at and above which a pixel of a file with integer values is saturated."""
     ball: Ball | None = None
     flat: Flat | None = None
     reference: Reference | None = None
@@ -165,7 +166,7 @@ class Calibration(Part):
     """Mirror balls in the pictures."""
     lights: dict[str, Lamp]
     photographs: list[Shot]
-    """In any order; empty if the first ones are to be planned."""
+    """The photographs, in any order; empty if Gonio is to plan the first ones."""
     uncertainty: Uncertainty = Uncertainty()
 
     @model_validator(mode="after")
@@ -183,20 +184,23 @@ class Calibration(Part):
         return self
 
     def intensity(self, light: str) -> Floats | None:
-        """Intensity of a lamp, (3,); None if it is not given."""
+        """The intensity of a lamp, (3,); None if it is not given."""
         given = self.lights[light].intensity
         return None if given is None else np.array(rgb(given))
 
 
 def read(path: Path) -> Calibration:
-    """The calibration in a file. Raises InputError if anything in it is invalid."""
+    """Read a calibration file. Raises InputError if anything in it is invalid."""
     if not path.is_file():
         raise InputError("no calibration file", str(path), f"name one with --calibration, or add {NAME} to the folder")
     return made(read_json(path), path)
 
 
 def made(raw: Mapping[str, Json], path: Path) -> Calibration:
-    """The calibration from the JSON contents of the file `path`, as `read` returns it."""
+    """A calibration from the JSON contents of a calibration file, as `read` returns it.
+
+    path  the file, for errors and for relative paths
+    """
     given = json.loads(json.dumps(dict(raw)))
     try:
         return Calibration.model_validate(given)

@@ -1,5 +1,8 @@
-"""Fit a material to pixels together with the uncertain quantities of the calibration: the position of the ball and the
-directions and intensities of the lamps. The calibration states the prior of each."""
+"""Fit a material to pixels, together with the errors of the calibration.
+
+These are the errors of the position of the ball, and of the directions and intensities of the lamps. Their priors are
+the standard deviations that the calibration states.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +23,9 @@ from .calibration import Floats, Uncertainty
 from .pixels import Chosen, Pixels, Scene, directions
 from .problem import Faults, Problem, across, inverse_of, middle_of
 
-FEW = 12_000  # pixels for the first steps; the last steps use all
-LEAST_NOISE = 1e-4  # relative noise below which pixels count as exact; it avoids a division by 0
-CERTAIN = 20.0  # signal-to-noise ratio above which a pixel is used to estimate the remaining noise
+FEW = 12_000  # number of pixels for the first steps; the last steps use all pixels
+LEAST_NOISE = 1e-4  # lower bound of the relative noise, which avoids a division by 0
+CERTAIN = 20.0  # signal-to-noise ratio above which a pixel is used for estimating the remaining noise
 MEDIAN_CHI2 = 0.454936  # median of a squared standard normal variable
 
 __all__ = ["Faults", "Fitted", "Problem", "across", "fitted", "inverse_of", "middle_of"]
@@ -32,11 +35,11 @@ __all__ = ["Faults", "Fitted", "Problem", "across", "fitted", "inverse_of", "mid
 class Fitted:
     """A material fitted to photographs.
 
-    fit      its parameters, as returned by `go.fit`
-    faults   calibration errors by name: (estimate, standard error), in stated standard deviations
-    noise    mean standard deviation of pixels about the fit, divided by their mean
+    fit      the fit, of the same type as the result of `go.fit`
+    faults   calibration errors by name: (estimate, standard error), in units of the stated standard deviations
+    noise    mean standard deviation of the pixels from the fit, divided by their mean
     problem  the solved problem
-    numbers  solution of the problem
+    numbers  the solution of the problem, as numbers
     """
 
     fit: Fit
@@ -58,8 +61,8 @@ def fitted(
     """Fit a model to the chosen pixels together with the calibration errors.
 
     stated  standard deviations of the calibration
-    fixed   path -> value of parameters that stay fixed
-    free    paths of additional parameters to fit that are fixed by default
+    fixed   values of parameters that stay fixed, by path
+    free    paths of parameters to fit that are fixed by default
     """
     started = time.perf_counter()
     few = _some(chosen, FEW)
@@ -72,7 +75,7 @@ def fitted(
     numbers = _solve_reweighted(problem, numbers)
     low, high, _ = ranges(problem.free)
     ended = (numbers <= low) | (numbers >= high)
-    if ended.any():  # a bound may have zero slope, such as an index of 1: retry from the values of the model
+    if ended.any():  # the slope may be 0 at a bound, such as an index of 1, so start again from the values of the model
         other = np.where(ended, np.concatenate([start_of(plain, moving), np.zeros(len(problem.open))]), numbers)
         problem.reweigh(numbers)
         other = solve(problem, other, steps=20).numbers
@@ -82,7 +85,7 @@ def fitted(
     full.reweigh(numbers)
     full.alike = _alike(full, numbers)
     full.reweigh(numbers)
-    # one standard error changes the sum of squares by 1, which is little compared with its total
+    # a change by one standard error changes the sum of squares by 1, which is little compared to the total
     numbers = solve(full, numbers, steps=6, tolerance=1e-10).numbers
     full.noise = _noise(full, numbers)
     full.reweigh(numbers)
@@ -90,7 +93,8 @@ def fitted(
 
 
 def _solve_reweighted(problem: Problem, numbers: Floats) -> Floats:
-    """Minimize the sum of squares, updating the weights from the prediction and the noise from the residuals."""
+    """Minimize the sum of squares, and repeatedly update the weights from the predicted values and the noise from the
+    residuals."""
     for _ in range(3):
         problem.reweigh(numbers)
         numbers = solve(problem, numbers, steps=12).numbers
@@ -99,14 +103,14 @@ def _solve_reweighted(problem: Problem, numbers: Floats) -> Floats:
 
 
 def _some(chosen: Chosen, count: int) -> list[Pixels]:
-    """A uniform random subset of about `count` pixels, in their order."""
+    """A uniformly random subset of about `count` pixels, in their original order."""
     share = count / max(len(chosen), 1)
     rng = np.random.default_rng(17)
     return [part.at(np.flatnonzero(rng.random(len(part)) < share)) if share < 1.0 else part for part in chosen.parts]
 
 
 def _data(scene: Scene, parts: Sequence[Pixels]) -> Data:
-    """Pixels as pairs of directions with f cos theta_i."""
+    """Convert pixels to pairs of directions and values of f cos theta_i."""
     views = [directions(scene, part.kind, part.place, part.lamp) for part in parts]
     value = [
         part.value * square[:, None] / scene.intensities[part.lamp]
@@ -122,8 +126,10 @@ def _data(scene: Scene, parts: Sequence[Pixels]) -> Data:
 
 
 def _noise(problem: Problem, numbers: Floats) -> float:
-    """Relative standard deviation of pixels about the prediction, in addition to photon, read and quantization noise:
-    with it, half of the bright pixels lie within the quartiles of their distribution."""
+    """The relative standard deviation of pixels from the prediction, without photon, read and quantization noise.
+
+    It is chosen so that half of the bright pixels lie within the quartiles of their predicted distribution.
+    """
     squares, variances = [], []
     for part, off, predicted in problem.off(numbers):
         bright = predicted > 1e-3 * float(np.percentile(predicted, 99.0))
@@ -145,7 +151,7 @@ def _noise(problem: Problem, numbers: Floats) -> float:
 
 
 def _alike(problem: Problem, numbers: Floats) -> float:
-    """Ratio of the score variance of tiles to that of pixels with independent errors, at least 1."""
+    """The variance of the scores of tiles, divided by the variance for independent errors of pixels; at least 1."""
     hessian, spread = problem.information(numbers)
     hessian, spread = hessian[: problem.own, : problem.own], spread[: problem.own, : problem.own]
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
@@ -159,7 +165,7 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     inverse = inverse_of(hessian + prior)
     # the sandwich estimator (Liang1986) with the priors
     covariance = inverse @ (spread + prior) @ inverse
-    # with few tiles per parameter, residuals are too small, so pixel noise is the lower bound
+    # if there are few tiles per parameter, residuals are too small, so the pixel noise is a lower bound
     variance = np.maximum(np.diag(covariance), np.diag(inverse))
     undetermined = undetermined_groups(hessian + prior)
     variance[[number for group in undetermined for number in group]] = np.inf
@@ -203,7 +209,10 @@ def _correlation(covariance: Floats) -> Floats:
 
 
 def _apart(problem: Problem, hessian: Floats) -> Floats:
-    """Correlations of the material's parameters for exact intensities, whose errors correlate all brightnesses."""
+    """The correlations of the material's parameters for exact intensities.
+
+    Errors of the intensities would correlate all parameters that affect brightness.
+    """
     bright = ["intensity" in name or name == "scale" for name in problem.open]
     columns = np.flatnonzero([True] * problem.own + [not one for one in bright])
     inverse = inverse_of((hessian + problem.prior())[np.ix_(columns, columns)])

@@ -1,5 +1,8 @@
-"""Geometry of photographs in the camera's frame: rays of pixels, the position of the ball from its outline, lamps from
-highlights in mirror balls, and local directions at the point that a pixel shows."""
+"""The geometry of photographs in the frame of the camera.
+
+Computes the rays of pixels, the position of a ball from its outline, the positions of lamps from highlights in mirror
+balls, and the local directions at the point that a pixel shows.
+"""
 
 from __future__ import annotations
 
@@ -17,20 +20,20 @@ from .calibration import Ball, Camera, Floats
 from .photographs import Photograph
 
 Array = backend.Array
-ANGLES = 720  # angles at which the outline is detected
-INSIDE = 2.0  # pixels inside the edge where the brightness of the ball is sampled
-SHARP = 2.5  # pixels within which an outline rises; the edge of a shadow takes longer
+ANGLES = 720  # number of angles at which the outline is detected
+INSIDE = 2.0  # distance from the edge at which the brightness of the ball is sampled, pixels
+SHARP = 2.5  # maximum width of the edge of an outline, pixels; the edge of a shadow is wider
 MIN_VISIBLE = 0.25  # fraction of the outline that must be detected
 ROUND = 0.6  # fraction of the detected outline that must lie on one circle
 BRIGHT = 0.3  # upper bound of the background, relative to the brightest value
-SYSTEMATIC = 0.1  # systematic error of a detected outline, pixels: limbs darken toward the edge
+SYSTEMATIC = 0.1  # systematic error of a detected outline, pixels, because the ball darkens toward its edge
 
 
 # ---------------------------------------------------------------------- camera
 
 
 def rays(camera: Camera, x: Floats, y: Floats) -> Floats:
-    """Unit directions (N, 3) of pixel coordinates, corrected for lens distortion."""
+    """The unit directions (N, 3) of rays through pixel coordinates, corrected for lens distortion."""
     across = (np.asarray(x) - camera.center[0]) / camera.focal_pixels
     down = (np.asarray(y) - camera.center[1]) / camera.focal_pixels
     bent = np.hypot(across, down)
@@ -52,7 +55,7 @@ def rays(camera: Camera, x: Floats, y: Floats) -> Floats:
 
 
 def pixels_of(camera: Camera, points: Floats) -> Floats:
-    """Pixel coordinates (N, 2) of points (N, 3) in front of the camera."""
+    """The pixel coordinates (N, 2) of points (N, 3) in front of the camera."""
     flat = points[:, :2] / points[:, 2:]
     square = np.sum(flat * flat, axis=1, keepdims=True)
     bent = flat * (1.0 + camera.k1 * square + camera.k2 * square**2)
@@ -64,13 +67,13 @@ def pixels_of(camera: Camera, points: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Placed:
-    """A ball in the camera's frame.
+    """A ball at its position in the frame of the camera.
 
-    center   (3,)
+    center   center of the ball, (3,)
     radius   radius of the ball
-    pixel    length that a pixel spans at its distance
-    off      standard deviations of its detected position, pixels, and of its radius, relative
-    given    whether its position was given; otherwise it follows from outline and radius
+    pixel    size of a pixel at the distance of the ball
+    off      standard deviations of the detected position, pixels, and of the radius, relative
+    given    whether the position was given; otherwise it is computed from the outline and the radius
     """
 
     center: Floats
@@ -81,9 +84,9 @@ class Placed:
 
 
 def placed(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid: Sequence[Placed] = ()) -> Placed:
-    """The ball at its given position, or as detected in the photographs.
+    """The ball at its given position, or at the position detected in the photographs.
 
-    avoid  balls that the detection must exclude
+    avoid  other balls, whose pixels the detection must ignore
     Raises InputError if no ball is visible.
     """
     if ball.center is not None:
@@ -97,9 +100,10 @@ def placed(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid:
 
 
 def _cone(directions: Floats) -> Floats:
-    """m of the cone d . m = 1 through unit directions: its axis is m / |m|, and the cosine of its half angle 1 / |m|.
+    """The vector m of the cone d . m = 1 that fits unit directions d best.
 
-    A ball's outline is such a cone about the direction of its center; the fit of m is a linear problem.
+    The axis of the cone is m / |m|, and the cosine of its half angle is 1 / |m|. The outline of a ball is such a cone
+    about the direction of its center. Fitting m is a linear problem.
     """
     return np.asarray(np.linalg.lstsq(directions, np.ones(len(directions)), rcond=None)[0])
 
@@ -111,7 +115,7 @@ def _of_cone(m: Floats, ball: Ball, camera: Camera, off: tuple[float, float] = (
 
 
 def _locate(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid: Sequence[Placed]) -> Placed:
-    """Detect the outline of the ball in all photographs together, since each lamp lights a different part."""
+    """Detect the outline of the ball in all photographs together, because each lamp lights a different part of it."""
     from scipy import ndimage
 
     hint = 'the background must be dark; or give "center" or "outline" of the ball'
@@ -149,12 +153,12 @@ def _locate(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid
 
 
 def _rim(picture: Floats) -> Floats:
-    """The pixels along the edges of a picture, which show the background."""
+    """The pixels at the edges of a picture, which show the background."""
     return np.concatenate([picture[:3].ravel(), picture[-3:].ravel(), picture[:, :3].ravel(), picture[:, -3:].ravel()])
 
 
 def _edge(brightness: Floats, x: float, y: float, ground: float, level: float) -> Floats:
-    """Pixel coordinates (N, 2) of sharp outer edges along rays about a center."""
+    """The pixel coordinates (N, 2) of the outermost sharp edge along each of several lines from a center."""
     from scipy import ndimage
 
     height, width = brightness.shape
@@ -181,7 +185,7 @@ def _edge(brightness: Floats, x: float, y: float, ground: float, level: float) -
 
 
 def _agreed(directions: Floats, camera: Camera) -> tuple[Floats | None, Floats]:
-    """The cone that contains most directions to within a pixel, and their residuals, pixels (RANSAC, Fischler1981)."""
+    """The cone that fits the most directions to within a pixel, and the residuals in pixels (RANSAC, Fischler1981)."""
     rng = np.random.default_rng(7)
     best = np.zeros(len(directions), bool)
     for _ in range(200):
@@ -201,13 +205,13 @@ def _agreed(directions: Floats, camera: Camera) -> tuple[Floats | None, Floats]:
 
 
 def _off(directions: Floats, m: Floats) -> Floats:
-    """Angles by which directions lie outside a cone, radians."""
+    """The angles by which directions lie outside a cone, radians."""
     length = float(np.linalg.norm(m))
     return np.asarray(np.arccos(np.clip(directions @ m / length, -1.0, 1.0)) - np.arccos(min(1.0 / length, 1.0)))
 
 
 def covers(ball: Placed, camera: Camera, margin: float = 1.0) -> NDArray[np.bool_]:
-    """Mask of the pixels that show a ball whose radius is scaled by `margin`."""
+    """A mask of the pixels that show a ball, whose radius is multiplied by `margin`."""
     direction = grid_rays(camera)
     distance = float(np.linalg.norm(ball.center))
     cos = np.sqrt(max(1.0 - (margin * ball.radius / distance) ** 2, 0.0))
@@ -215,7 +219,7 @@ def covers(ball: Placed, camera: Camera, margin: float = 1.0) -> NDArray[np.bool
 
 
 def grid_rays(camera: Camera) -> Floats:
-    """Rays of the centers of all pixels, (H W, 3)."""
+    """The rays through the centers of all pixels, (H W, 3)."""
     y, x = np.mgrid[0 : camera.size[1], 0 : camera.size[0]]
     return rays(camera, x.ravel() + 0.5, y.ravel() + 0.5)
 
@@ -226,10 +230,12 @@ def grid_rays(camera: Camera) -> Floats:
 def lamp_in_mirrors(
     photograph: Photograph, mirrors: Sequence[Placed], camera: Camera, about: Floats, distance: float | None
 ) -> Floats:
-    """The position of a lamp from its highlights in mirror balls: the point closest to the reflected rays, or for a
-    single mirror the point of its ray at `distance` from the point `about`.
+    """The position of a lamp from its highlights in mirror balls.
 
-    Raises InputError if a mirror shows no highlight, or if there is a single mirror and no distance.
+    It is the point closest to the reflected rays. For a single mirror ball, it is the point on the reflected ray at
+    the given distance from the point `about`.
+
+    Raises InputError if a mirror ball shows no highlight, or if there is a single mirror ball and no distance.
     """
     origins, directions = [], []
     for mirror in mirrors:
@@ -276,7 +282,7 @@ def _highlight(photograph: Photograph, where: NDArray[np.bool_]) -> tuple[float,
 
 
 class Seen(NamedTuple):
-    """Local directions to camera and lamp, and the squared distance of the lamp."""
+    """The local directions to the camera and to the lamp, and the squared distance of the lamp."""
 
     wo: Array
     wi: Array
@@ -284,12 +290,15 @@ class Seen(NamedTuple):
 
 
 def on_ball(ray: Array, center: Array, radius: Array, lamp: Array) -> Seen:
-    """Local directions where rays hit a ball, or its limb if they miss it; z is the normal, x and y as in Duff2017."""
+    """The local directions where rays hit a ball, or at its edge if they miss it.
+
+    z is the normal; x and y are chosen as in Duff2017.
+    """
     along = ops.dot(ray, center)
     root = ops.sqr(along) - ops.dot(center, center) + ops.sqr(radius)
     point = ray * (along - ops.safe_sqrt(root))
     normal = (point - center) / radius
-    # the normal faces the camera, so that its z, which points forward, is always negative: a frame without a seam
+    # the normal faces the camera, so its z, which points forward, is negative, and the frame has no singularity
     a = -1.0 / (normal.z - 1.0)
     b = normal.x * normal.y * a
     x = ops.vec3(1.0 - ops.sqr(normal.x) * a, -b, normal.x)
@@ -298,7 +307,10 @@ def on_ball(ray: Array, center: Array, radius: Array, lamp: Array) -> Seen:
 
 
 def on_plane(ray: Array, base: Array, frame: tuple[Array, Array, Array], lamp: Array) -> Seen:
-    """Local directions where rays hit the plane through the point `base`, in the frame of its axes, z the normal."""
+    """The local directions where rays hit the plane through the point `base`.
+
+    frame  the axes of the local frame, of which z is the normal
+    """
     x, y, normal = frame
     point = ray * (ops.dot(base, normal) / ops.dot(ray, normal))
     return _local(ray, point, x, y, normal, lamp)

@@ -1,4 +1,4 @@
-"""Convert photographs to radiance: decode and linearize files, divide by exposure times, merge series of exposures."""
+"""Convert photographs to radiance: decode and linearize files, divide by exposure times, and merge exposures."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from .series import Exposed, Noise
 from .shutter import Ratio, Shutter, estimated
 
 Floats = NDArray[np.float64]
-STEPS = 255  # levels of an 8-bit file, the smallest depth of cameras
+STEPS = 255  # quantization steps of an 8-bit file, the smallest bit depth of cameras
 
 
 @dataclass(frozen=True)
 class Photograph:
-    """Radiance of a photograph, in the camera's linear unit per second.
+    """A photograph, converted to radiance in the linear unit of the camera per second.
 
-    name         name of the file, the first of a series
-    shot         its entry in the calibration
-    radiance     (H, W, 3); nan where every exposure was saturated
-    step         (H, W, 3), standard deviation from quantization, in a series also from photon and read noise
-    photon       (H, W, 3), derivative of the square of `step` with respect to the radiance; 0 for unknown noise
+    name         name of the file; for a series, of its first file
+    shot         entry in the calibration
+    radiance     (H, W, 3); nan where every exposure is saturated
+    step         (H, W, 3), standard deviation due to quantization and, for a series, also photon and read noise
+    photon       (H, W, 3), derivative of step^2 with respect to the radiance; 0 if the noise is unknown
     noise        noise of the camera, estimated from a series of exposures
-    scale_error  relative error of all radiance, from errors of exposure times
+    scale_error  relative error common to all radiance, due to errors of exposure times
     ratios       measured ratios of exposure times
-    seconds      stated exposure times
-    cut          whether noise below 0 was stored as 0, with a known standard deviation
+    seconds      stated exposure times, s
+    cut          whether negative noise was stored as 0 and its standard deviation is known
     """
 
     name: str
@@ -56,8 +56,10 @@ class Photograph:
 def read_all(
     calibration: Calibration, folder: Path, progress: Callable[[str], None] = lambda text: None
 ) -> list[Photograph]:
-    """Read all photographs. The errors of exposure times are estimated from all series; if there are any, the series
-    are merged again with corrected times.
+    """Read all photographs of a calibration.
+
+    The errors of exposure times are estimated from all series. If there are such errors, the series are merged again
+    with corrected times.
 
     progress  called before each photograph, with the name of its first file
     """
@@ -77,7 +79,7 @@ def read(shot: Shot, calibration: Calibration, folder: Path, shutter: Shutter | 
     """Read a photograph and merge its exposures. Raises InputError, with the name of the file, if it is unusable.
 
     folder   the folder that contains the files
-    shutter  errors of the exposure times; None: estimated from this series
+    shutter  errors of the exposure times; None estimates them from this series
     """
     exposures = [_exposed(one, calibration, folder) for one in shot.pictures]
     merged = series.merge(exposures, calibration.uncertainty.seconds, shutter)
@@ -101,7 +103,7 @@ def read(shot: Shot, calibration: Calibration, folder: Path, shutter: Shutter | 
 
 
 def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> Exposed:
-    """The linear signal of a picture, nan where saturated."""
+    """Read a picture as a linear signal, which is nan where saturated."""
     path = folder / one.file
     where = str(path)
     try:
@@ -150,7 +152,7 @@ def _sixteen(values: Floats) -> bool:
 
 
 def _light(values: Floats, calibration: Calibration) -> Floats:
-    """Convert values of a file to light with the camera's response."""
+    """Convert the values of a file to light, by the camera's response."""
     response = calibration.response
     if response == "linear":
         return values
@@ -165,7 +167,7 @@ def _light(values: Floats, calibration: Calibration) -> Floats:
 
 
 def _own_seconds(content: bytes) -> float | None:
-    """The exposure time in an OpenEXR file (`expTime`) or in a JPEG's EXIF; None if there is none."""
+    """The exposure time stored in an OpenEXR file (`expTime`) or in the EXIF data of a JPEG file; None if missing."""
     seconds: float | None = None
     try:
         if formats.kind_of(content) == "OpenEXR":
@@ -180,7 +182,10 @@ def _own_seconds(content: bytes) -> float | None:
 
 
 def _exif_seconds(content: bytes) -> float | None:
-    """ExposureTime, tag 0x829A of the EXIF directory, which is tag 0x8769 of the first directory (CIPA DC-008, 4.6)."""
+    """ExposureTime, tag 0x829A of the EXIF directory, to which tag 0x8769 of the first directory points.
+
+    See CIPA DC-008, 4.6.
+    """
     at = content.find(b"Exif\0\0", 0, 1 << 16)
     if at < 0:
         return None

@@ -21,14 +21,15 @@ from .calibration import Camera, Flat, Floats
 from .geometry import Array, Placed, Seen
 from .photographs import Photograph
 
-GRAZING = 80.0  # degrees: beyond, errors of the outline shift the angles too far, and papers exclude them (Ngan2005)
+# largest angle from the normal, degrees; beyond it, errors of the outline change the angles too much (as in Ngan2005)
+GRAZING = 80.0
 EDGE = 0.02  # fraction of a flat sample excluded at each edge
 NEAR = 5.0  # standard deviations above 0 within which the clipping of values at 0 matters
 TILE = 8  # pixels: errors within a tile are correlated
 MIN_PIXELS = 50  # minimum number of lit pixels of a sample
 CONTRAST = 3.0  # minimum brightness ratio of the lit sample to the background
-GAUSS = 0.5 / np.sqrt(3.0)  # of a pixel: two-point Gauss quadrature
-CELLS = (60, 60, 36)  # cells of sqrt(theta_h), theta_d and phi_d
+GAUSS = 0.5 / np.sqrt(3.0)  # distance of the nodes of two-point Gauss quadrature from the pixel center, pixels
+CELLS = (60, 60, 36)  # numbers of cells along sqrt(theta_h), theta_d and phi_d
 
 Kind = Literal["ball", "flat"]
 FATES = ("used", "saturated", "shadowed", "grazing")  # categories of the sample's pixels
@@ -36,10 +37,10 @@ FATES = ("used", "saturated", "shadowed", "grazing")  # categories of the sample
 
 @dataclass(frozen=True)
 class Scene:
-    """Camera, sample and lamps of the photographs.
+    """The camera, samples and lamps of the photographs.
 
-    lamps        (L, 3), positions of the lamps
-    intensities  (L, 3), radiant intensities of the lamps
+    lamps        positions of the lamps, (L, 3)
+    intensities  radiant intensities of the lamps, (L, 3)
     names        names of the lamps
     """
 
@@ -52,7 +53,7 @@ class Scene:
 
     @cached_property
     def plane(self) -> tuple[Floats, Floats]:
-        """A point of the flat sample, and its axes (3, 3): x along edge0, z the normal on the camera's side."""
+        """A point of the flat sample, and its axes, (3, 3): x along edge0, and z the normal toward the camera."""
         assert self.flat is not None, "a photograph shows it"
         return plane_of(self.flat)
 
@@ -74,11 +75,11 @@ class Pixels:
     kind    "ball" or "flat"
     place   (N, 2), pixel coordinates of their centers
     lamp    (N,), index of the lamp
-    tile    (N,), index of the tile of neighbors
-    value   (N, 3), radiance in the camera's unit
-    step    (N, 3), standard deviation from quantization, in a series also from photon and read noise
-    photon  (N, 3), derivative of the square of `step` with respect to the radiance
-    cut     (N,), whether noise below 0 was stored as 0
+    tile    (N,), index of the tile of neighboring pixels
+    value   (N, 3), radiance in the unit of the camera
+    step    (N, 3), standard deviation due to quantization and, for a series, also photon and read noise
+    photon  (N, 3), derivative of step^2 with respect to the radiance
+    cut     (N,), whether negative noise was stored as 0
     """
 
     kind: Kind
@@ -91,18 +92,18 @@ class Pixels:
     cut: NDArray[np.bool_]
 
     def variance(self, radiance: Floats) -> Floats:
-        """Variance of `value` from `step` and `photon`, (N, 3), at a given radiance.
+        """The variance of `value`, (N, 3), at a given radiance, from `step` and `photon`.
 
-        The variance of merged exposures is concave in the radiance (a parallel sum of linear functions), so its tangent
-        at `value` is an upper bound and positive.
+        The variance of merged exposures is a concave function of the radiance (a parallel sum of linear functions), so
+        its tangent at `value` is a positive upper bound.
         """
         return np.maximum(self.step**2 + self.photon * (np.abs(radiance) - np.maximum(self.value, 0.0)), 0.0)
 
     def expected(self, radiance: Floats) -> tuple[Floats, Floats]:
-        """(mean of the stored values (N, 3), its derivative with respect to the radiance) at a given radiance.
+        """The mean of the stored values, (N, 3), at a given radiance, and its derivative with respect to the radiance.
 
-        Where noise below 0 is stored as 0, the mean of a normal variable of mean m and standard deviation s that is
-        clipped at 0 is m P(m / s) + s p(m / s), with the normal distribution P and its density p (Tobin1958).
+        If negative values are stored as 0, the mean of a normal variable of mean m and standard deviation s is
+        m P(m / s) + s p(m / s), where P is the cumulative normal distribution and p its density (Tobin1958).
         """
         mean, slope = radiance.copy(), np.ones_like(radiance)
         spread = np.sqrt(self.variance(radiance))
@@ -131,9 +132,9 @@ class Pixels:
 
 
 def observe(scene: Scene, kind: Kind, ray: Array, lamp: Array, ball: tuple[Array, Array] | None = None) -> Seen:
-    """Local directions and lamp distances at the points of a sample that rays hit.
+    """The local directions, and the distances of the lamp, at the points where rays hit a sample.
 
-    ball  center and radius of the ball if they differ from those of the scene
+    ball  center and radius of the ball, if they differ from those of the scene
     """
     types = backend.types_like(type(ray))
     if kind == "ball":
@@ -151,7 +152,7 @@ def constant(vector: Floats, types: backend.Types) -> Array:
 
 
 def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
-    """(wo, wi, squared distance of the lamp) in float64 at pixel coordinates; NaN outside the ball."""
+    """wo, wi and the squared distance of the lamp at pixel coordinates, in float64; NaN outside the ball."""
     types = backend.types("float64")
     ray = backend.vector_of(geometry.rays(scene.camera, *place.T), 3, types)
     view = observe(scene, kind, ray, backend.vector_of(scene.lamps[lamp], 3, types))
@@ -160,13 +161,17 @@ def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64])
     return wo, wi, square
 
 
-# ---------------------------------------------------------------------- choosing
+# ---------------------------------------------------------------------- selection
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """The usable pixels of all photographs, the number of sample pixels per category of `FATES`, and for each
-    photograph a map of these categories: 0 outside the sample, otherwise 1 + the index in `FATES`."""
+    """The usable pixels of all photographs.
+
+    parts   the pixels, in groups
+    counts  number of pixels of the sample in each category of `FATES`
+    maps    a map of the categories for each photograph: 0 outside the sample, otherwise 1 + the index in `FATES`
+    """
 
     parts: tuple[Pixels, ...]
     counts: Mapping[str, int]
@@ -179,10 +184,10 @@ class Chosen:
 def choose(
     scene: Scene, photographs: Sequence[Photograph], grazing: float, slack: tuple[float, float] = (0.0, 0.0)
 ) -> Chosen:
-    """Select the pixels of samples that are not saturated, shadowed, or viewed or lit beyond `grazing` degrees.
+    """Select the pixels of samples that are neither saturated nor shadowed, nor viewed or lit beyond `grazing` degrees.
 
-    slack  possible errors of the ball's outline, relative to its radius, and of a lamp's direction, radians; pixels
-           that these could move beyond the angle `grazing` are excluded too
+    slack  possible errors of the ball's outline, relative to its radius, and of a lamp's direction, radians. Pixels
+           whose true angle could therefore exceed `grazing` are excluded too
     Raises InputError, with the name of the file, if a photograph does not show the sample at its position.
     """
     counts, maps = dict.fromkeys(FATES, 0), {}
@@ -229,8 +234,10 @@ def choose(
 
 
 def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.bool_]:
-    """Whether a pixel is, or may be, viewed or lit beyond `grazing` degrees. A relative error s of the outline tilts
-    the normal such that sin theta_o becomes (1 + s) sin theta_o."""
+    """Whether a pixel is, or may be, viewed or lit beyond `grazing` degrees from the normal.
+
+    A relative error s of the outline tilts the normal so that sin theta_o becomes (1 + s) sin theta_o.
+    """
     outline, lamp = slack
     theta_o, theta_i = (np.arccos(np.clip(np.nan_to_num(w[:, 2], nan=0.0), -1.0, 1.0)) for w in (wo, wi))
     moved = (1.0 + outline) * np.sin(theta_o)
@@ -254,7 +261,7 @@ def _joined(group: list[Pixels]) -> Pixels:
 
 
 def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Centers of the pixels that show a sample, and (row, column) of each. Raises InputError if there are none."""
+    """The centers of the pixels that show a sample, and their rows and columns. Raises InputError if there are none."""
     if kind == "ball":
         assert scene.ball is not None, "a photograph shows it"
         inside = geometry.covers(scene.ball, scene.camera)
@@ -269,7 +276,7 @@ def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64]
 
 
 def on_flat(camera: Camera, flat: Flat) -> NDArray[np.bool_]:
-    """Mask of the pixels that show a flat sample, without its edges."""
+    """A mask of the pixels that show a flat sample, without its edges."""
     base, frame = plane_of(flat)
     ray = geometry.grid_rays(camera)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -307,11 +314,11 @@ def _check_sample(
 
 @dataclass(frozen=True)
 class Gathered:
-    """Samples, each the mean of the pixels in a cell of theta_h, theta_d and phi_d.
+    """BRDF samples, each of which is the mean of the pixels in a cell of theta_h, theta_d and phi_d.
 
     table  the samples, unordered
-    error  (N,), relative standard error from the scatter of the pixels; nan for a single pixel
-    count  (N,), pixels per sample
+    error  (N,), relative standard error, from the scatter of the pixels; nan for a single pixel
+    count  (N,), number of pixels per sample
     """
 
     table: Samples
@@ -319,8 +326,10 @@ class Gathered:
     count: NDArray[np.int64]
 
     def confidence(self) -> Floats:
-        """Relative standard error of f over (sqrt(theta_h), theta_d); nan in cells without samples, where the table
-        uses the nearest samples."""
+        """The relative standard error of f in cells of (sqrt(theta_h), theta_d).
+
+        It is nan in cells without samples, where the table interpolates the nearest samples.
+        """
         theta_h, theta_d, _ = half_difference_arrays(*self.table.pairs())
         at = (_cell(np.sqrt(theta_h / (0.5 * np.pi)), CELLS[0]), _cell(theta_d / (0.5 * np.pi), CELLS[1]))
         inverse, spread = np.zeros(CELLS[:2]), np.full(CELLS[:2], np.nan)
@@ -334,7 +343,7 @@ def _cell(share: Floats, count: int) -> NDArray[np.int64]:
 
 
 def gather(scene: Scene, chosen: Chosen, title: str) -> Gathered:
-    """Convert pixels to samples f = radiance distance^2 / (intensity cos theta_i), averaged per cell."""
+    """Convert pixels to BRDF samples, f = radiance distance^2 / (intensity cos theta_i), averaged in each cell."""
     angles, values = [], []
     for part in chosen.parts:
         wo, wi, square = directions(scene, part.kind, part.place, part.lamp)

@@ -1,4 +1,4 @@
-"""Residuals between pixels and a material under lamps, with the calibration errors as additional parameters."""
+"""The least-squares problem of a fit to photographs, in which calibration errors are additional parameters."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from .calibration import Floats, Uncertainty
 from .geometry import Array
 from .pixels import GAUSS, Pixels, Scene, constant, observe
 
-CHUNK = 1 << 17  # pixels per launch, to bound memory
-FARTHEST = 8.0  # bound of a calibration error, in standard deviations
+CHUNK = 1 << 17  # pixels per kernel launch, which bounds memory
+FARTHEST = 8.0  # upper bound of a calibration error, in standard deviations
 BALL = ("ball.x", "ball.y", "ball.radius")
 LAMP = ("right", "down", "intensity")
 
 
 class Rows(NamedTuple):
-    """Pixels of one lamp and channel: residuals (N,), derivatives (N, K), indices of their parameters, tiles."""
+    """The pixels of one lamp and channel: residuals (N,), derivatives (N, K), indices of the parameters, and tiles."""
 
     residual: NDArray[np.floating]
     slope: NDArray[np.floating]
@@ -38,12 +38,12 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class Faults:
-    """Standard deviations of the calibration's errors; the corresponding parameters are in units of these.
+    """The standard deviations of the calibration errors, which are the units of the corresponding parameters.
 
-    ball       of the ball's position to the right and down, pixels, and of its radius, relative
-    scale      of the scale of all intensities together, relative
-    direction  of each lamp's direction to the right and down as seen from the sample, radians
-    intensity  of each lamp's intensity, relative
+    ball       standard deviations of the ball's position, horizontal and vertical, pixels, and of its radius, relative
+    scale      standard deviation of a scale factor common to all intensities, relative
+    direction  standard deviation of each lamp's direction, horizontal and vertical as seen from the sample, radians
+    intensity  standard deviation of each lamp's intensity, relative
     """
 
     ball: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -59,14 +59,13 @@ class Faults:
         return cls((center, center, radius), stated.scale, float(np.radians(stated.light)), stated.intensity)
 
     def names(self, lamps: Sequence[str], ball: bool) -> list[str]:
-        """Names of the uncertain quantities, shared ones first."""
+        """The names of the uncertain quantities; those common to all lamps come first."""
         names = [name for name, sd in zip(BALL, self.ball, strict=True) if sd > 0.0 and ball]
         names += ["scale"] if self.scale > 0.0 else []
         return names + [f"{lamp}.{name}" for lamp in lamps for name in self.of_lamp]
 
     def slack(self, scene: Scene) -> tuple[float, float]:
-        """Three standard deviations of the outline of the ball, relative to its radius, and of a lamp's direction,
-        radians."""
+        """Three standard deviations of the ball's outline, relative to its radius, and of a lamp's direction, rad."""
         ball = (
             0.0
             if scene.ball is None
@@ -81,12 +80,18 @@ class Faults:
 
 @dataclass
 class Problem:
-    """Residuals of pixels, (predicted - measured) / standard deviation, and of each calibration error, its parameter.
+    """A least-squares problem.
+
+    The residual of a pixel is (predicted - measured) / standard deviation. The residual of a calibration error is its
+    parameter, in units of the stated standard deviation.
 
     material  the material to fit
-    moving    its free parameters
+    moving    free parameters of the material
+    scene     camera, sample and lamps
+    parts     groups of pixels
+    faults    standard deviations of the calibration errors
     noise     relative standard deviation of a pixel
-    alike     divisor of the weights for correlated errors of neighboring pixels
+    alike     number of neighboring pixels that count as one, because their errors are correlated
     """
 
     material: BSDF
@@ -113,11 +118,11 @@ class Problem:
 
     @cached_property
     def columns(self) -> list[list[int]]:
-        """Groups of material parameters that share one derivative: a single one, or the three channels of a color."""
+        """Groups of material parameters with a common derivative: single numbers, and the three channels of colors."""
         return columns_of(self.material, self.moving)
 
     def of_row(self, lamp: int, channel: int) -> list[int]:
-        """Indices of the parameters of the derivatives, in the order of `_radiance`."""
+        """The indices of the parameters of a lamp and channel, in the order of the derivatives from `_radiance`."""
         shared = [columns[channel] if len(columns) > 1 else columns[0] for columns in self.columns]
         names = [*BALL, "scale", *(f"{self.scene.names[lamp]}.{name}" for name in LAMP)]
         return shared + [self.own + self.open.index(name) for name in names if name in self.open]
@@ -125,7 +130,7 @@ class Problem:
     # ------------------------------------------------------------------ prediction
 
     def predicted(self, part: Pixels, numbers: Floats, derive: bool) -> tuple[Floats, Floats | None]:
-        """Expected values of pixels, (N, 3), averaged over four points per pixel, and their derivatives (N, 3, K)."""
+        """The expected values of pixels, (N, 3), averaged over four points per pixel; their derivatives, (N, 3, K)."""
         values, derivatives = [], []
         for start in range(0, len(part), CHUNK):
             some = part.at(np.arange(start, min(start + CHUNK, len(part))))
@@ -137,7 +142,7 @@ class Problem:
         return np.concatenate(values), together
 
     def _radiance(self, part: Pixels, numbers: Floats, derive: bool) -> tuple[Floats, Floats | None]:
-        """Radiance of pixels, (N, 3), and its derivatives (N, 3, K)."""
+        """The radiance of pixels, (N, 3), and its derivatives, (N, 3, K)."""
         dr, types = backend.drjit(), backend.types("float32")
         scene, faults = self.scene, self.faults
         rows = len(part)
@@ -192,7 +197,7 @@ class Problem:
         return shown, np.stack(slope, -1)
 
     def _ball(self, off: list[Array], types: backend.Types) -> tuple[Array, Array]:
-        """Center and radius of the ball with their errors."""
+        """The center and radius of the ball, including their errors."""
         placed = self.scene.ball
         assert placed is not None, "a photograph shows it"
         right, down = across(placed.center)
@@ -202,11 +207,11 @@ class Problem:
             center = center + constant(axis * placed.pixel * amount, types) * one
         larger = 1.0 + backend.float_of(sd[2], types) * off[2]
         radius = backend.float_of(placed.radius, types)
-        # an outline that is too large belongs to a ball that is assumed too near
+        # if the outline is too large, the assumed position of the ball is too near
         return (center, radius * larger) if placed.given else (center / larger, radius)
 
     def _lamps(self, turns: list[Array], types: backend.Types) -> Array:
-        """Positions of the lamps with the errors of their directions."""
+        """The positions of the lamps, including the errors of their directions."""
         middle = middle_of(self.scene)
         away = self.scene.lamps - middle
         distance = np.linalg.norm(away, axis=1, keepdims=True)
@@ -250,15 +255,17 @@ class Problem:
         return np.asarray(1.0 / (self._spread(part, predicted) * np.sqrt(self.alike)))
 
     def _spread(self, part: Pixels, predicted: Floats) -> Floats:
-        """Standard deviation of pixels, (N, 3). It follows the prediction, since measured values that are low by chance
-        would otherwise get more weight."""
+        """The standard deviation of pixels, (N, 3).
+
+        It is computed from the predicted values, because measured values that are low by chance would get more weight.
+        """
         floor = 1e-6 * float(np.abs(part.value).max())
-        # lower bound for pixels that a calibration error moves into the dark
+        # a lower bound for pixels that a calibration error moves into the dark
         size = np.maximum(np.abs(predicted), 0.1 * np.abs(part.value))
         return np.asarray(np.sqrt((self.noise * size) ** 2 + part.variance(size) + floor**2))
 
     def relative_spread(self, numbers: Floats) -> float:
-        """Mean standard deviation of pixels divided by their mean."""
+        """The mean standard deviation of the pixels, divided by their mean."""
         predicted = [(part, self.predicted(part, numbers, False)[0]) for part in self.parts]
         total = sum(float(np.abs(values).sum()) for _, values in predicted)
         return sum(float(self._spread(part, values).sum()) for part, values in predicted) / max(total, 1e-300)
@@ -272,7 +279,7 @@ class Problem:
         return differences
 
     def linearized(self, numbers: Floats) -> list[Linearized]:
-        """Residuals and derivatives per lamp and channel, and the priors."""
+        """The residuals of each lamp and channel, those of the priors, and their derivatives."""
         return [(one.residual, one.slope, one.which) for one in self.rows(numbers)] + self._priors(numbers)
 
     def _priors(self, numbers: Floats) -> list[Linearized]:
@@ -282,7 +289,7 @@ class Problem:
         return [(numbers[self.own :], np.eye(len(faults)), faults)]
 
     def rows(self, numbers: Floats) -> list[Rows]:
-        """Residuals, derivatives and tiles per lamp and channel."""
+        """The residuals, derivatives and tiles of each lamp and channel."""
         if self._weights is None:
             self.reweigh(numbers)
         assert self._weights is not None
@@ -301,10 +308,10 @@ class Problem:
                     blocks.append(Rows(residual[rows, channel], slope[rows, channel], which, part.tile[rows], lamp))
         return blocks
 
-    # ------------------------------------------------------------------ how sure
+    # ------------------------------------------------------------------ uncertainty
 
     def information(self, numbers: Floats) -> tuple[Floats, Floats]:
-        """(J^T J, sum of squares of the scores J^T r per tile) of the pixels without priors."""
+        """J^T J, and the sum over tiles of the outer products of their scores J^T r, for the pixels without priors."""
         hessian = np.zeros((self.count, self.count))
         tiles = 1 + max(int(part.tile.max()) for part in self.parts)
         gradients = np.zeros((tiles, self.count))
@@ -315,12 +322,12 @@ class Problem:
         return hessian, gradients.T @ gradients
 
     def prior(self) -> Floats:
-        """Information of the calibration: 1 for each of its uncertain quantities."""
+        """The information matrix of the calibration, with 1 on the diagonal for each uncertain quantity."""
         return np.diag(np.r_[np.zeros(self.own), np.ones(len(self.open))])
 
 
 def middle_of(scene: Scene) -> Floats:
-    """Pivot of the lamp directions: the center of the ball or of the flat sample."""
+    """The point about which lamps are rotated: the center of the ball or of the flat sample."""
     if scene.ball is not None:
         return scene.ball.center
     flat = scene.flat
@@ -338,7 +345,7 @@ def across(direction: Floats) -> tuple[Floats, Floats]:
 
 
 def inverse_of(matrix: Floats) -> Floats:
-    """The inverse of an information matrix, 0 for parameters without information."""
+    """The inverse of an information matrix, with 0 for parameters without information."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     told = np.diag(matrix) > 0.0
     inverse = np.zeros_like(matrix)

@@ -1,4 +1,4 @@
-"""Render the photographs of a calibration, to test a rig, a plan or a fit before anything is built.
+"""Render the photographs of a calibration, to test a setup, a plan or a fit before anything is built.
 
 rehearsal.take(calibration, go.Conductor(alpha=0.2), "photographs", noise=0.01)
 go.capture("photographs", "conductor")
@@ -42,14 +42,16 @@ def take(
 ) -> Path:
     """Render the photographs of a calibration into a folder, write a calibration file, and return the folder.
 
-    calibration  contents of a calibration file, with the positions of ball and lamps, and without lens distortion
+    calibration  contents of a calibration file with the positions of ball and lamps, and without lens distortion
     material     material of the sample
-    noise        relative standard deviation of each value; or a camera's read noise, photons and relative noise
-    bits         8 or 16 for integer .png files, encoded by the calibration's response (linear or srgb; for 16 bits
-                 linear); None for radiance, in .exr, .hdr or .npz. The calibration must name files of that kind
+    folder       the folder to which the files are written
+    noise        relative standard deviation of each value, or the `Noise` of a camera
+    bits         8 or 16 for integer .png files, encoded by the response in the calibration, which is linear or srgb for
+                 8 bits and linear for 16 bits; None for radiance in .exr, .hdr or .npz files. The calibration must name
+                 files of this kind
     spp          samples per pixel
     seed         seed of the renders and of the noise
-    stated       the calibration to write if it differs from `calibration`, to simulate calibration errors
+    stated       the calibration to write; it may differ from `calibration`, in order to simulate calibration errors
     """
     told = made(calibration, Path("calibration"))
     target = files.check_folder(folder)
@@ -74,11 +76,11 @@ def take(
 
 
 def _noisy(signal: Floats, noise: float | Noise, rng: np.random.Generator) -> Floats:
-    """A signal (H, W, 3) with the noise of a camera."""
+    """Add the noise of a camera to a signal (H, W, 3)."""
     if not isinstance(noise, Noise):
         return np.asarray(signal * (1.0 + noise * rng.normal(size=signal.shape)))
     gain = np.maximum(noise.gain, 1e-12)
-    photons = np.minimum(np.maximum(signal, 0.0) / gain, 1e15)  # noise beyond is negligible
+    photons = np.minimum(np.maximum(signal, 0.0) / gain, 1e15)  # for more photons, the noise is negligible
     read, relative = (np.sqrt(part) * rng.normal(size=signal.shape) for part in (noise.read, noise.relative))
     return np.asarray(rng.poisson(photons) * gain + read + relative * signal)
 
@@ -95,7 +97,7 @@ def _stored(values: Floats, calibration: Calibration, bits: int) -> np.ndarray:
 
 
 def _rendered(calibration: Calibration, light: str, sample: str, material: BSDF, spp: int, seed: int) -> Floats:
-    """Radiance of the sample under one lamp, by Gonio's own renderer."""
+    """The radiance of the sample under one lamp, rendered by Gonio."""
     camera, lamp = calibration.camera, calibration.lights[light]
     if lamp.position is None or camera.k1 or camera.k2:
         raise InputError("lamps with positions and a lens without distortion expected", "calibration")

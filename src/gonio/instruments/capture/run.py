@@ -34,14 +34,14 @@ PHOTOGRAPHS = frozenset({operands.Kind.CALIBRATION, operands.Kind.FOLDER, operan
 
 @dataclass(frozen=True)
 class Capture:
-    """Result of `capture`.
+    """The result of `capture`.
 
-    scene     camera, ball and lamps as given or detected; after a fit, with corrected calibration errors
-    samples   BRDF samples averaged in cells: table, standard errors, and pixels per sample
-    counts    pixels of the sample: used, saturated, shadowed, grazing
-    fitted    the material fitted to the pixels; None without a model
-    warnings  defects of the pictures, and parameters that they do not determine
-    others    the other fitted models, by their criterion, best first
+    scene     camera, sample and lamps as given or detected; after a fit, they are corrected for calibration errors
+    samples   BRDF samples, averaged in cells: the table, the standard errors, and the number of pixels per sample
+    counts    numbers of pixels of the sample: used, saturated, shadowed and grazing
+    fitted    the material fitted to the pixels; None if no model was given
+    warnings  defects of the pictures, and parameters that the pictures do not determine
+    others    the other fitted models, ranked by the BIC, best first
     """
 
     scene: Scene
@@ -55,7 +55,7 @@ class Capture:
 
     @property
     def fit(self) -> Fit:
-        """The material with its parameters, their errors and correlations. Raises InputError without a fit."""
+        """The fitted material with its parameters, their errors and correlations. Raises InputError without a fit."""
         if self.fitted is None:
             raise InputError("no material was fitted", "model", 'go.capture(photographs, "lambert+ggx")')
         return self.fitted.fit
@@ -66,9 +66,11 @@ class Capture:
         return self.fit.material
 
     def next(self, count: int = 1, places: Sequence[Sequence[float]] | None = None) -> list[Proposal]:
-        """Plan the next photographs: positions of the lamp, best first.
+        """Plan the next photographs: the most informative positions of the lamp, best first.
 
-        places  possible positions in the camera's frame; None: anywhere at the median distance of the lamps
+        count   number of photographs
+        places  possible positions in the frame of the camera; None allows any direction at the median distance of the
+                lamps
         """
         if self.fitted is None:
             raise InputError("no material was fitted", "model", "a plan needs a fitted model")
@@ -101,7 +103,7 @@ class Capture:
         return files.write_whole(path, form.write(form.resampled(self.samples.table)))
 
     def as_dict(self) -> dict[str, Any]:
-        """Dictionary for JSON."""
+        """The result as a dictionary for JSON."""
         ball = self.scene.ball
         entries: dict[str, Any] = {
             "pixels": dict(self.counts),
@@ -135,14 +137,14 @@ class Capture:
 
 
 def check_output(path: Path) -> Path:
-    """Return the path, or raise InputError if the result cannot be written there."""
+    """Return the path of a result. Raises InputError if the result cannot be written there."""
     if path.suffix.lower() != ".json":
         _table_format(path)
     return files.check_file(path)
 
 
 def _table_format(path: Path) -> Format:
-    """The table format of the suffix. Raises InputError if it cannot be written."""
+    """The table format of a path's suffix. Raises InputError if Gonio cannot write this format."""
     form = format_of(path)
     if not form.writes:
         raise InputError(f"{form.name} files cannot be written", str(path), "such as -o gold.gonio")
@@ -161,29 +163,29 @@ def capture(
     free: Sequence[str] = (),
     progress: Callable[[str], None] = lambda text: None,
 ) -> Capture:
-    """Measure a material from photographs of a ball, or of a flat sample, under a lamp in several places.
+    """Measure a material from photographs of a ball or a flat sample, lit by a lamp at several positions.
 
         result = go.capture("photographs", "lambert+ggx")
         result.fit.interval          # 95 % interval per parameter
         result.save("paint.gonio")
 
     photographs  a folder with a calibration.json, or files that the calibration lists
-    model        model to fit, as in `go.fit`; several are ranked by their criterion; None: samples only
-    calibration  the calibration file; None: calibration.json in the folder of the photographs
-    grazing      angle from the normal, degrees; pixels viewed or lit beyond it are excluded
-    param        path -> value of parameters that stay fixed
-    free         paths of additional parameters to fit that are fixed by default
-    progress     called before each step, with its name
-    Raises InputError, with the file's name, for photographs without exposure data, of another size, completely
-    saturated, or without a visible sample.
+    model        model to fit, as in `go.fit`. Several models are ranked by the BIC. None computes only the samples
+    calibration  the calibration file; None selects calibration.json in the folder of the photographs
+    grazing      largest angle from the normal, degrees; pixels viewed or lit at larger angles are excluded
+    param        values of parameters that stay fixed, by path
+    free         paths of parameters to fit that are fixed by default
+    progress     called before each step, with the name of the step
+    Raises InputError, with the name of the file, for photographs without an exposure time, of a different size,
+    completely saturated, or without a visible sample.
     """
     if not 10.0 <= grazing < 90.0:
         raise InputError(f"{grazing:g} degrees given, 10 to less than 90 expected", "grazing")
     path, stated, folder = _calibration(photographs, calibration)
-    shots = photographs_of.read_all(stated, folder, lambda file: progress(f"reads {file}"))
+    shots = photographs_of.read_all(stated, folder, lambda file: progress(f"reading {file}"))
     scene = _scene(stated, shots)
-    progress("chooses pixels")
-    # errors of exposure times are those of the overall scale
+    progress("selecting pixels")
+    # errors of exposure times act as errors of the overall scale
     scale = float(np.hypot(stated.uncertainty.scale, max(shot.scale_error for shot in shots)))
     uncertainty = stated.uncertainty.model_copy(update={"scale": scale})
     slack = fitting.Faults.of(uncertainty, scene).slack(scene)
@@ -192,7 +194,7 @@ def capture(
         raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
     results = []
     for one in model if isinstance(model, list | tuple) else () if model is None else (model,):
-        progress("fits")
+        progress("fitting")
         results.append(fitting.fitted(scene, chosen, one, uncertainty, fixed=param, free=free))
     results.sort(key=lambda one: one.fit.criterion)
     result = results[0] if results else None
@@ -216,13 +218,13 @@ def plan(
 ) -> list[Proposal]:
     """Plan the first photographs: the most informative lamp positions for a material similar to the model.
 
-    calibration  a calibration file with a ball and its position, or a flat sample, and a lamp with its position and
-                 intensity
-    model        the model to fit, with values close to those of the material
+    calibration  a calibration file with a ball at a given position or a flat sample, and with a lamp of given position
+                 and intensity
+    model        the model to fit, with parameters close to those of the material
     count        number of photographs
-    places       possible positions of the lamp; None: anywhere at the distance of the calibration's lamp
-    fixed        path -> value of parameters that stay fixed
-    free         paths of additional parameters to fit that are fixed by default
+    places       possible positions of the lamp; None allows any direction at the distance of the lamp in the
+    calibration fixed        values of parameters that stay fixed, by path
+    free         paths of parameters to fit that are fixed by default
     """
     path = Path(os.path.expanduser(calibration))
     stated = calibrations.read(path)
@@ -252,7 +254,10 @@ def _points(places: Sequence[Sequence[float]]) -> Floats:
 
 
 def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> Path:
-    """The calibration file: `calibration` if given, else that of the named photographs or folder, or the named file."""
+    """The path of the calibration file: `calibration` if given, otherwise that in the folder of the photographs.
+
+    named  the photographs, their folder, or the calibration file itself
+    """
     if calibration is not None:
         return Path(os.path.expanduser(calibration))
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
@@ -266,13 +271,13 @@ def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | 
 
 
 def is_blank(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> bool:
-    """Whether the calibration lists no photograph of a sample yet."""
+    """Whether the calibration lists no photograph of a sample."""
     stated = calibrations.read(calibration_of(named, calibration))
     return all(shot.sample == "reference" for shot in stated.photographs)
 
 
 def _calibration(named: str | Path | Sequence[str], calibration: str | Path | None) -> tuple[Path, Calibration, Path]:
-    """(calibration file, calibration with the named photographs only, folder of the photographs)."""
+    """The calibration file, the calibration with only the named photographs, and the folder of the photographs."""
     path = calibration_of(named, calibration)
     full = calibrations.read(path)
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
@@ -327,7 +332,7 @@ def _scene(stated: Calibration, shots: Sequence[Photograph]) -> Scene:
 
 
 def _intensity(stated: Calibration, scene: Scene, name: str, shots: Sequence[Photograph]) -> Floats:
-    """Intensity of a lamp, as given or from the white target."""
+    """The intensity of a lamp, as given or as determined from photographs of the white target."""
     given = stated.intensity(name)
     if given is not None:
         return given

@@ -1,27 +1,27 @@
-"""Merge exposures of one view by variance, with the camera's noise estimated from the exposures themselves.
+"""Merge several exposures of one view by inverse-variance weighting, with the noise estimated from the exposures.
 
-A linear camera stores y_i = L t_i + noise of light L exposed for t_i seconds, with
+For light L and an exposure time of t_i seconds, a linear camera stores y_i = L t_i + noise, with
 
     Var(y_i) = read + gain L t_i + (relative L t_i)^2 + q_i^2
 
-(EMVA standard 1288, plus a relative part proportional to the signal, such as a flickering lamp; q_i is the known
-quantization error of the file). The unbiased mean of x_i = y_i / t_i with the smallest variance has the weights
-1 / v_i, v_i = Var(y_i) / t_i^2 (Gauss and Markov; Debevec1997 weights by the value alone), and its variance is
-1 / sum(1 / v_i).
+This is the model of EMVA standard 1288, extended by a noise proportional to the signal, such as that of a flickering
+lamp; q_i is the known quantization error of the file. Let x_i = y_i / t_i. The unbiased mean of the x_i with the
+smallest variance has the weights 1 / v_i, with v_i = Var(y_i) / t_i^2 (Gauss and Markov; Debevec1997 derives weights
+from the value alone), and its variance is 1 / sum(1 / v_i).
 
-v_i depends on L. Evaluated at the exposure's own value, it gives more weight to values that are low by chance, which
-biases the mean by about -gain / t. Evaluated at the merged value, it does not: with these weights, the merged value is
-uncorrelated with every difference x_i - x_j (independent of it for Gaussian noise), so weights that depend on it are
-unbiased to first order. So v_i is iterated on the merged value, starting with weights proportional to the seconds, the
-best ones for pure photon noise. For the same reason, the tests for saturation and clipping at 0 use merged values: an
-exposure counts if its mean with the shorter ones is three standard deviations below saturation, and if it is three
-above 0 or the longest that counts. A test of the shorter ones alone would include the long exposure where they are low
-by chance, and exclude it where they are high: an error of 0.5 % of the light for a sensor of 1,000 electrons, and of
-its exposure times.
+v_i depends on L. If it were computed from the value of the exposure itself, values that are low by chance would get
+more weight, which would bias the mean by about -gain / t. It is therefore computed from the merged value: this value is
+uncorrelated with every difference x_i - x_j (and independent of it for Gaussian noise), so weights that depend on it
+are unbiased to first order. v_i and the merged value are computed iteratively, starting with weights proportional to
+the exposure times, which are optimal for pure photon noise. For the same reason, the tests for saturation and for
+clipping at 0 use merged values. An exposure is used if its mean with the shorter exposures is three standard deviations
+below saturation, and if the merged value is three standard deviations above 0 or no longer exposure is usable. A test
+of the shorter exposures alone would include the long exposure where they are low by chance and exclude it where they
+are high. This would cause an error of 0.5 % of the light, and of the exposure times, for a sensor of 1,000 electrons.
 
-The difference of two exposures at pixels of similar L has the variance v_i + v_j, independent of the picture. It is
-linear in (read, gain, relative^2), which are fitted over bins of L by non-negative least squares, per channel. The
-mean of x_i / x_j measures the ratio of exposure times (`shutter.py`).
+The difference of two exposures at pixels with similar L has the variance v_i + v_j, independent of the content of the
+picture. It is linear in (read, gain, relative^2), which are fitted by non-negative least squares over bins of L, per
+channel. The mean of x_i / x_j measures the ratio of exposure times (`shutter.py`).
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ from scipy.optimize import nnls
 from .calibration import Floats
 from .shutter import Ratio, Shutter, estimated
 
-SIGMAS = 3.0  # standard deviations from saturation or 0 within which an exposure is ignored
-UNKNOWN = 0.8  # fraction of saturation up to which exposures count before their noise is known
-ROUNDS = 4  # iterations of merged value and noise; the fourth changes either by less than a thousandth
-BINS = 48  # bins of light for estimating variances
+SIGMAS = 3.0  # an exposure within this number of standard deviations of saturation or 0 is ignored
+UNKNOWN = 0.8  # fraction of saturation up to which exposures are used before their noise is known
+ROUNDS = 4  # iterations of the merged value and the noise; the fourth changes both by less than a thousandth
+BINS = 48  # number of bins of light for estimating variances
 MIN_PIXELS = 30  # minimum number of pixels per bin
-NEIGHBORS = 2  # exposures further apart have hardly any usable pixels in common
-BLACK = 0.003  # fraction of a bin's pixels at 0 above which clipping affects its variance
-MIN_GAIN = 10.0  # gain in chi-square for an additional parameter: the BIC for some hundred bins; also 3 sigma
+NEIGHBORS = 2  # maximum distance of compared exposures in the series; others share hardly any usable pixels
+BLACK = 0.003  # fraction of pixels at 0 in a bin above which clipping affects its variance
+MIN_GAIN = 10.0  # reduction of chi-square that an additional parameter requires: 3 sigma, and the BIC for some 100 bins
 NOISELESS = 1e-9  # relative to the brightest light
-TINY = 1e-120  # stands for a variance of 0; its inverse can still be squared
+TINY = 1e-120  # replaces a variance of 0; the square of its inverse does not overflow
 CUT = 4.0  # standard deviations above which a difference indicates motion rather than noise
 
 
@@ -56,8 +56,8 @@ class Exposed(NamedTuple):
 
     file     name of the file
     signal   (H, W, 3), linear; nan where saturated
-    step     (H, W, 3), standard deviation of its quantization; 0 for floating-point files, which are never clipped
-    seconds  stated exposure time
+    step     (H, W, 3), standard deviation due to quantization; 0 for floating-point files, which are never clipped
+    seconds  stated exposure time, s
     ceiling  signal at saturation
     """
 
@@ -73,10 +73,12 @@ class Exposed(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Noise of a camera, (3,) each: variance of the read noise, photon variance per signal, and variance of the noise
-    proportional to the signal, relative to its square.
+    """The noise of a camera.
 
-    known  whether there were pixels to estimate it from
+    read      variance of the read noise, (3,)
+    gain      variance of the photon noise per unit of signal, (3,)
+    relative  variance of the noise that is proportional to the signal, relative to the squared signal, (3,)
+    known     whether there were pixels from which to estimate the noise
     """
 
     read: Floats
@@ -85,23 +87,23 @@ class Noise(NamedTuple):
     known: bool = True
 
     def variance(self, light: Floats, seconds: float, step: Floats) -> Floats:
-        """Variance of signal / seconds, (H, W, 3), at a given light."""
+        """The variance of signal / seconds, (H, W, 3), for a given amount of light."""
         size = np.maximum(light, 0.0)
         return (self.read + step**2) / seconds**2 + self.gain * size / seconds + self.relative * size**2
 
 
 @dataclass(frozen=True)
 class Merged:
-    """Merged light of a series.
+    """The merged light of a series of exposures.
 
     light     (H, W, 3), signal per second; nan where every exposure is saturated
-    spread    (H, W, 3), standard deviation from read noise, photons and quantization
-    photon    (H, W, 3), derivative of that variance with respect to the light
+    spread    (H, W, 3), standard deviation due to read noise, photon noise and quantization
+    photon    (H, W, 3), derivative of the variance, spread^2, with respect to the light
     noise     noise of the camera; zeros for a single exposure
-    times     estimated divided by stated exposure times, shortest first
+    times     estimated exposure times divided by the stated ones, shortest first
     ratios    measured ratios of exposure times
-    shares    fraction of all light from each exposure, by stated seconds
-    shutter   the errors of exposure times that were corrected
+    shares    fraction of the light from each exposure, by its stated time in seconds
+    shutter   errors of the exposure times that were corrected
     """
 
     light: Floats
@@ -115,15 +117,16 @@ class Merged:
 
     @property
     def scale_error(self) -> float:
-        """Relative standard error of all light, from the errors of the exposure times."""
+        """The relative standard error of all light due to the errors of the exposure times."""
         return self.shutter.scale_error(self.shares)
 
 
 def merge(exposures: Sequence[Exposed], off: float = 0.0, shutter: Shutter | None = None) -> Merged:
-    """Merge exposures of one view. Raises InputError if stated times contradict the pixels by more than a tenth.
+    """Merge several exposures of one view.
 
-    off      standard deviation of relative errors of exposure times; 0 if it is not known
-    shutter  the errors themselves, estimated from all series of a camera; None: estimated from this series
+    off      standard deviation of the relative errors of exposure times; 0 if it is unknown
+    shutter  errors of the exposure times, estimated from all series of the camera; None estimates them from this series
+    Raises InputError if a stated time differs by more than a tenth from the time that the pixels indicate.
     """
     ordered = sorted(exposures, key=lambda one: one.seconds)
     seconds = [one.seconds for one in ordered]
@@ -137,7 +140,7 @@ def merge(exposures: Sequence[Exposed], off: float = 0.0, shutter: Shutter | Non
         for _ in range(ROUNDS):
             noise = _noise(ordered, times, all_light, below)
             below = _below(ordered, times, light, noise)
-            # a mean of every exposure, which is uncorrelated with every difference
+            # the mean of all exposures is uncorrelated with the difference of any two
             all_light = _mean(ordered, times, light, below, noise)
             used = _above(ordered, times, light, below, noise)
             light = _mean(ordered, times, light, used, noise)
@@ -145,7 +148,7 @@ def merge(exposures: Sequence[Exposed], off: float = 0.0, shutter: Shutter | Non
                 ratios = _ratios(ordered, times, light, used, noise)
                 known = estimated(ratios, seconds, off)
                 times = np.array([known.factor(one) for one in seconds])
-    # a fit estimates the relative noise again, together with other errors proportional to the signal
+    # the relative noise is omitted because the fit estimates it together with other errors proportional to the signal
     spread, photon = _spread(ordered, times, light, used, noise._replace(relative=np.zeros(3)))
     shares = _shares(ordered, times, light, used, noise)
     light = np.where(used.any(axis=0), light, np.nan)
@@ -153,7 +156,10 @@ def merge(exposures: Sequence[Exposed], off: float = 0.0, shutter: Shutter | Non
 
 
 def _start(exposures: Sequence[Exposed]) -> tuple[Floats, NDArray[np.bool_]]:
-    """(light, which exposures count (K, H, W, 3)) with photon-noise weights, from the shortest exposure."""
+    """The light, and a mask of usable exposures, (K, H, W, 3), with the weights for photon noise.
+
+    Exposures are added one by one, starting with the shortest.
+    """
     total, seconds = np.zeros_like(exposures[0].signal), np.zeros_like(exposures[0].signal)
     used = []
     for one in exposures:
@@ -168,7 +174,7 @@ def _start(exposures: Sequence[Exposed]) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def _below(exposures: Sequence[Exposed], times: Floats, light: Floats, noise: Noise) -> NDArray[np.bool_]:
-    """Mask of exposures below saturation, (K, H, W, 3), as predicted by the shorter ones and the exposure itself."""
+    """A mask of exposures below saturation, (K, H, W, 3), predicted from the exposure itself and the shorter ones."""
     total, weights = np.zeros_like(light), np.zeros_like(light)
     used = []
     for one, factor in zip(exposures, times, strict=True):
@@ -187,7 +193,7 @@ def _below(exposures: Sequence[Exposed], times: Floats, light: Floats, noise: No
 def _above(
     exposures: Sequence[Exposed], times: Floats, light: Floats, below: NDArray[np.bool_], noise: Noise
 ) -> NDArray[np.bool_]:
-    """Mask of usable exposures, (K, H, W, 3): those well above 0, and the longest."""
+    """A mask of usable exposures, (K, H, W, 3): those well above 0, and the longest one below saturation."""
     longer = np.zeros(light.shape, bool)
     used = []
     for one, factor, fine in reversed(list(zip(exposures, times, below, strict=True))):
@@ -202,7 +208,7 @@ def _above(
 
 
 def _mean(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise) -> Floats:
-    """The minimum-variance mean, with variances evaluated at the mean itself."""
+    """The minimum-variance mean, where the variances are computed from the mean itself."""
     for _ in range(3):
         total, weights = np.zeros_like(light), np.zeros_like(light)
         for one, factor, fine in zip(exposures, times, used, strict=True):
@@ -217,7 +223,7 @@ def _mean(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDAr
 def _shares(
     exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise
 ) -> dict[float, float]:
-    """Fraction of the light of all pixels from each exposure, by its stated seconds."""
+    """The fraction of the light of all pixels that comes from each exposure, by its stated time in seconds."""
     weights = []
     for one, factor, fine in zip(exposures, times, used, strict=True):
         variance = np.maximum(noise.variance(light, one.seconds * factor, one.step), TINY)
@@ -234,8 +240,10 @@ def _shares(
 def _spread(
     exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise
 ) -> tuple[Floats, Floats]:
-    """(standard deviation of the merged light, derivative of its variance with respect to the light):
-    V = 1 / sum(1 / v_i), dV/dL = V^2 sum(v_i' / v_i^2)."""
+    """The standard deviation of the merged light, and the derivative of its variance V with respect to the light.
+
+    V = 1 / sum(1 / v_i), dV/dL = V^2 sum(v_i' / v_i^2).
+    """
     inverse, slope = np.zeros_like(light), np.zeros_like(light)
     for one, factor, fine in zip(exposures, times, used, strict=True):
         seconds = one.seconds * factor
@@ -248,7 +256,7 @@ def _spread(
 
 
 def _noise(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_]) -> Noise:
-    """Read noise, gain and relative noise from the differences of exposures that are at most `NEIGHBORS` apart."""
+    """The read noise, gain and relative noise, from differences of exposures that are at most `NEIGHBORS` apart."""
     coefficients, known = np.zeros((3, 3)), False
     pairs = [(k, j) for k, j in itertools.combinations(range(len(exposures)), 2) if j - k <= NEIGHBORS]
     for channel in range(3):
@@ -259,17 +267,19 @@ def _noise(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDA
         coefficients[channel] = _least(columns, variance, error)
         known = known or bool(len(variance))
     told = coefficients.any(axis=1)
-    if told.any():  # dark channels get the median noise of the others: the sensor is the same
+    if told.any():  # dark channels get the median noise of the others, because the sensor is the same
         coefficients[~told] = np.median(coefficients[told], axis=0)
-    else:  # noise-free, such as renders: any weights are valid; those of photon noise are used
+    else:  # for noise-free pictures such as renders, any weights are valid; those for photon noise are used
         coefficients[:, 1] = NOISELESS * max(float(light.max(initial=0.0)), 1e-30)
     read, gain, relative = coefficients.T
     return Noise(read, gain, relative, known)
 
 
 def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
-    """Non-negative (read, gain, relative^2) that fit variances (B,) with relative errors (B,) best. The last is hard to
-    separate from photon noise, so it is 0 unless it reduces chi-square by `MIN_GAIN`."""
+    """The non-negative (read, gain, relative^2) that best fit variances (B,) with relative errors (B,).
+
+    relative^2 is hard to distinguish from photon noise, so it is 0 unless it reduces chi-square by `MIN_GAIN`.
+    """
     if not variance.any():
         return np.zeros(3)
     scale = np.maximum(columns.max(axis=0), 1e-300)
@@ -277,13 +287,13 @@ def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
     best, misfit = np.zeros(3), np.inf
     for some in ([0, 1], [0, 1, 2]):
         size = np.maximum(variance, floor)
-        for _ in range(4):  # the error of a variance is proportional to the fitted variance, for the reason given above
+        for _ in range(4):  # weights from the fitted variances are unbiased, as explained above
             weight = 1.0 / (np.maximum(size, floor) * error)
             part, _ = nnls((columns / scale)[:, some] * weight[:, None], variance * weight)
             coefficients = np.zeros(3)
             coefficients[some] = part / scale[some]
             size = columns @ coefficients
-        # logarithms bound the residual of variances far from the fitted ones
+        # logarithms limit the residuals of variances that are far from the fitted ones
         rest = float(np.sum((np.log(np.maximum(variance, floor) / np.maximum(size, floor)) / error) ** 2))
         if rest < misfit - (MIN_GAIN if len(some) > 2 else 0.0):
             best, misfit = coefficients, rest
@@ -293,8 +303,11 @@ def _least(columns: Floats, variance: Floats, error: Floats) -> Floats:
 def _variances(
     short: Exposed, long: Exposed, factors: Floats, light: Floats, both: NDArray[np.bool_], channel: int
 ) -> tuple[Floats, Floats, Floats]:
-    """(derivatives (B, 3) with respect to read noise, gain and relative variance; variance (B,) of the difference of
-    two exposures; relative error of each (B,)), over bins of light, without quantization noise."""
+    """The variance of the difference of two exposures in bins of light, without quantization noise.
+
+    Returns its derivatives with respect to read noise, gain and relative variance, (B, 3), the variance, (B,), and its
+    relative error, (B,).
+    """
     fine = both[..., channel] & (light[..., channel] > 0.0) if short.clips else both[..., channel]
     level = light[..., channel][fine]
     if len(level) < MIN_PIXELS:
@@ -309,7 +322,7 @@ def _variances(
         black = np.bincount(which, one.signal[..., channel][fine] <= 0.0, len(edges) + 1)
         return np.asarray(black > BLACK * np.bincount(which, minlength=len(edges) + 1) + 1.0)
 
-    # values of the short exposure that are clipped at 0 have negative differences: the others have the same variance
+    # where the short exposure is clipped at 0, differences are negative; the positive ones have the same variance
     counts = ~clipped(short)[which] | (difference > 0.0) if short.clips else np.ones(len(level), bool)
     inliers = counts
     for _ in range(4):
@@ -333,8 +346,11 @@ def _variances(
 def _ratios(
     exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_], noise: Noise
 ) -> list[Ratio]:
-    """Ratios of the times of neighboring exposures. Pixels are weighted by their light divided by the variance of the
-    difference: this gives the smallest variance, and the light is uncorrelated with that difference."""
+    """The ratios of the times of successive exposures.
+
+    Pixels are weighted by their light divided by the variance of the difference. These weights give the smallest
+    variance, and the light is uncorrelated with the difference.
+    """
     ratios: list[Ratio] = []
     if not noise.known:
         return ratios

@@ -1,1 +1,1 @@
-"""The virtual gonioreflectometer: rays (`rays`), detector readings (`readings`), files (`run`)."""
+"""The virtual gonioreflectometer: ray tracing (`rays`), detector readings (`readings`), measurements (`run`)."""

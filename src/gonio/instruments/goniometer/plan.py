@@ -1,4 +1,4 @@
-"""Directions to measure: the cells of a file format, or angles given by the user."""
+"""The directions to measure: those of a file format, or angles given by the user."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_CELLS = 1 << 24
 class Plan:
     """A file format and the directions at which it stores values.
 
-    file  the format; .gonio if no file is written
+    file  the file format; that of .gonio files if no file is written
     kind  kind of the table
     """
 
@@ -65,7 +65,10 @@ class Plan:
 
 
 def axis_of(text: str | None, name: str) -> list[float] | None:
-    """Angles from "0,30,60", or "0:85:5" for every fifth degree up to 85; None if `text` is None."""
+    """Parse a list of angles such as "0,30,60", or a range such as "0:85:5", from 0 to 85 in steps of 5.
+
+    Returns None if `text` is None.
+    """
     if text is None:
         return None
     where = f"--{name.replace('_', '-')}"
@@ -93,9 +96,9 @@ def axis_of(text: str | None, name: str) -> list[float] | None:
 def angles_of(values: Sequence[float] | None, default: Floats, name: str, most: float) -> Floats:
     """Convert angles in degrees to a sorted axis in radians; None selects `default`, which is in radians.
 
-    name  name of the axis, for errors
+    name  name of the axis in errors
     most  largest valid angle, degrees
-    Raises InputError for no angles, and for one out of range.
+    Raises InputError for an empty list, and for angles out of range.
     """
     if values is None:
         return default
@@ -110,7 +113,10 @@ def angles_of(values: Sequence[float] | None, default: Floats, name: str, most: 
 def grid_of(
     theta_i: Sequence[float] | None, theta_r: Sequence[float] | None, phi: Sequence[float] | None
 ) -> tuple[Floats, Floats, Floats] | None:
-    """Axes [rad] from given angles [degrees], missing ones as in tables of kind `angles`; None if none are given."""
+    """The axes of a grid [rad] from angles [degrees]; None if no angles are given.
+
+    An axis that is not given has the default nodes of a table of kind `angles`.
+    """
     if theta_i is None and theta_r is None and phi is None:
         return None
     thetas, phis = angles.nodes()
@@ -127,10 +133,10 @@ def grid_of(
 
 
 def without(table: Measurement, blocked: float) -> tuple[Measurement, float, bool]:
-    """Remove the cells whose two directions are closer than `blocked` [rad].
+    """Remove the cells in which the angle between the two directions is less than `blocked` [rad].
 
-    Returns the table, the fraction of removed cells, and whether removal is possible: cells of MERL tables can be
-    invalid and samples can be missing, but other tables have a value everywhere.
+    Returns the table, the fraction of affected cells, and whether they have been removed: cells of MERL tables can be
+    marked as invalid and samples can be omitted, but other tables must have a value everywhere.
     """
     if blocked <= 0.0:
         return table, 0.0, True
@@ -155,12 +161,12 @@ def without(table: Measurement, blocked: float) -> tuple[Measurement, float, boo
 
 
 def between(wo: Floats, wi: Floats) -> Floats:
-    """Angle between two directions (N, 3), rad, (N,)."""
+    """The angle between pairs of directions (N, 3), rad, (N,)."""
     return 2.0 * np.arctan2(np.linalg.norm(wo - wi, axis=1), np.linalg.norm(wo + wi, axis=1))
 
 
 def beside_lamp(wo: Floats, wi: Floats, blocked: float) -> Floats:
-    """wo, with directions inside the blocked cone about wi moved to its rim."""
+    """wo, where directions inside the blocked cone about wi are moved to its edge."""
     hidden = between(wo, wi) < blocked
     if blocked <= 0.0 or not hidden.any():
         return wo

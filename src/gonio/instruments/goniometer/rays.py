@@ -1,4 +1,4 @@
-"""Ray tracing in a periodic patch of a surface: Mitsuba intersects the facets, a Dr.Jit loop follows the bounces."""
+"""Ray tracing in a periodic patch of a surface: Mitsuba intersects the facets, and a Dr.Jit loop traces the bounces."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ...ops import backend
 from ..surfaces.base import Patch
 
 Floats = NDArray[np.float64]
-Kernel: TypeAlias = Any  # a value inside a kernel
+Kernel: TypeAlias = Any  # a Dr.Jit value in a kernel
 
 MAX_BOUNCES = 256
-MAX_STEPS = 4096  # bounces plus crossings of a periodic boundary
+MAX_STEPS = 4096  # maximum number of bounces and crossings of a periodic boundary
 OFFSET = 1e-6  # distance of a ray's origin from its facet, relative to the period's extent: a few float32 ulps
 UNDERWAY, AWAY, DARK, LOST = 0, 1, 2, 3  # states of a ray; DARK: absorbed, LOST: below the surface due to rounding
-LANES = 1 << 21  # rays per launch, to bound memory
+LANES = 1 << 21  # rays per kernel launch, which bounds memory
 
 
 class Ground(NamedTuple):
     """A patch as a Mitsuba scene.
 
-    scene   the triangles
+    scene   the triangles of the patch
     size    extent of the period in x and y
     top     height at which rays start and escape
     offset  distance of a ray's origin from its facet
@@ -40,7 +40,7 @@ class Ground(NamedTuple):
 
 
 def ground(patch: Patch) -> Ground:
-    """Build the acceleration structure of a patch."""
+    """Build the Mitsuba scene of a patch, with its acceleration structure."""
     mi = engine.load()
     mesh = mi.Mesh("patch", len(patch.vertices), len(patch.faces))
     parameters = mi.traverse(mesh)
@@ -54,7 +54,7 @@ def ground(patch: Patch) -> Ground:
 
 
 class Left(NamedTuple):
-    """Final state of each ray; rays that neither escaped nor were lost were absorbed.
+    """The final state of each ray. Rays that neither escaped nor were lost have been absorbed.
 
     angle      index of the angle of incidence
     direction  final direction, rotated so that the light comes from above the x axis
@@ -73,7 +73,7 @@ class Left(NamedTuple):
 
 
 class Box(NamedTuple):
-    """One period of a patch in the kernel: its half extents, the height of its top, and the offset from facets."""
+    """One period of a patch as kernel values: half extents, height of the top, and offset of ray origins."""
 
     half_x: Kernel
     half_y: Kernel
@@ -82,7 +82,7 @@ class Box(NamedTuple):
 
 
 class State(NamedTuple):
-    """A ray in flight: position, direction, throughput, facets hit, steps taken, one of the states above."""
+    """A ray during tracing: position, direction, throughput, number of facets hit, number of steps, and state."""
 
     place: Kernel
     along: Kernel
@@ -94,11 +94,11 @@ class State(NamedTuple):
 
 
 def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count: int, seed: int) -> Left:
-    """Trace rays from above the surface until they leave.
+    """Trace rays from above the surface until they leave it or are absorbed.
 
-    facet    material of the facets, bound to the variant's types
+    facet    material of the facets, bound to the types of the variant
     cosines  cosines of the angles of incidence; azimuths and positions are uniformly distributed
-    each     rays per angle; all rays are numbered angle by angle
+    each     rays per angle of incidence; rays are numbered angle by angle
     first    index of the first of `count` rays
     seed     seed of the random numbers
     """
@@ -130,10 +130,10 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
 
 
 def _step(scene: Scene, facet: BSDF, box: Box, now: State) -> State:
-    """Advance a ray to the next facet, to the opposite side of the period, or above the top."""
+    """Advance a ray to the next facet, across the boundary of the period, or to the top, where it escapes."""
     mi = engine.load()
     place, along, weight, bounces, steps, state, rng = now
-    # before a facet, a ray may reach a boundary of the period or the top
+    # a ray may reach a boundary of the period or the top before it hits a facet
     wall_x, wall_y = _boundary(place.x, along.x, box.half_x), _boundary(place.y, along.y, box.half_y)
     wall = dr.maximum(dr.minimum(wall_x, wall_y), 0.0)
     roof = dr.select(along.z > 0.0, (box.top - place.z) / along.z, dr.inf)
@@ -165,8 +165,10 @@ def _step(scene: Scene, facet: BSDF, box: Box, now: State) -> State:
 
 
 def _positions(number: Kernel, each: int, rng: Kernel) -> tuple[Kernel, Kernel]:
-    """Positions in the unit square along a Z-order curve: neighboring rays hit the same facets, which is 3 times as
-    fast."""
+    """Positions in the unit square along a Z-order curve.
+
+    Neighboring rays hit the same facets, which makes tracing 3 times as fast.
+    """
     mi = engine.load()
     along_curve = mi.Float64(number % dr.opaque(mi.UInt32, each)) + mi.Float64(rng.next_float32())
     index = mi.UInt32(dr.minimum(along_curve * dr.opaque(mi.Float64, 2.0**32 / each), 2.0**32 - 1.0))
@@ -194,7 +196,7 @@ def _every_other(bits: Kernel) -> Kernel:
 
 
 def bound(facet: BSDF) -> BSDF:
-    """Bind the material of a facet to Mitsuba's types, ready for use in loops."""
+    """Bind the material of the facets to Mitsuba's types, so that it can be used in symbolic loops."""
     mi = engine.load()
     guide_search.prepare(facet)
     return facet.bind(backend.types_like(mi.Float))

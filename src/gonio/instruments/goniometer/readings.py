@@ -1,10 +1,11 @@
-"""Detector readings of a rough surface, from rays: one map of outgoing light per angle of incidence.
+"""Detector readings of a rough surface, from traced rays: one map of outgoing light per angle of incidence.
 
-A map is a grid on the equal-area disk, (x, y) = sqrt(1 - cos theta) (cos phi, sin phi), with the light above x. The
-surface rotates under the light, so y and -y are equivalent and only half of the disk is stored. The opening of the
-detector is a cone; in the maps, it consists of the squares whose centers it contains, interpolated between the four
-centers around its axis. The collected light is divided by the projected solid angle of the same squares above the
-horizon, so f is an average over them.
+A map is a grid on the equal-area disk, (x, y) = sqrt(1 - cos theta) (cos phi, sin phi), with the light in the x-z
+plane. The surface rotates under the light, so y and -y are equivalent, and only half of the disk is stored. The
+aperture of the detector is a cone. In a map, the light in the cone about a square is the sum over all squares whose
+centers lie in the cone; the reading is interpolated between the four squares around the axis of the detector. The
+collected light is divided by the projected solid angle of these squares above the horizon, so f is an average over
+them.
 """
 
 from __future__ import annotations
@@ -27,21 +28,22 @@ from .specimen import GROUPS, Floats, Specimen, half_angle
 
 SQUARES = 2.5  # squares of the map per half angle of the detector
 SMALLEST = 0.25  # degrees, the smallest half angle of a detector
-MAX_LIGHTS = 64  # angles of incidence measured individually; more are interpolated linearly from a grid
-STEEPEST = 89.0  # degrees of incidence; beyond, values are those at this angle
+MAX_LIGHTS = 64  # number of angles of incidence above which readings are interpolated linearly from a grid
+STEEPEST = 89.0  # largest angle of incidence, degrees; at larger angles, the values at this angle are used
 PARTS = 8  # subdivisions per side of a square, to integrate its part above the horizon
-MAX_RAYS = 1 << 24  # rays per patch and angle that a float32 sum can hold
+MAX_RAYS = 1 << 24  # rays per patch and angle of incidence that a float32 sum can count
 MAX_BYTES = 4 << 30  # memory limit of the maps
 
 
 @dataclass(frozen=True)
 class Tracing:
-    """How many rays are traced, and where.
+    """Options of ray tracing.
 
     samples   rays per angle of incidence, over all patches
-    patches   measured patches of a random surface; rounded up to a multiple of `GROUPS`
+    patches   number of patches of a random surface; rounded up to a multiple of `GROUPS`
+    seed      seed of the random numbers
     device    "cpu", "cuda" or "auto"
-    progress  called with the number of rays traced and their total
+    progress  called with the number of rays traced and their total number
     """
 
     samples: int
@@ -52,18 +54,23 @@ class Tracing:
 
 
 class Rough(Specimen):
-    """A surface of facets, measured with rays. The attributes are set by `prepare`.
+    """A rough surface, given as a triangle mesh and measured by ray tracing. `prepare` sets the attributes.
 
     lights  angles of incidence [rad], (N,)
-    first   fraction of the light that leaves after one facet, (N, 3)
-    later   fraction of the light that leaves after two facets or more, (N, 3)
+    first   fraction of the light that leaves after one reflection, (N, 3)
+    later   fraction of the light that leaves after two or more reflections, (N, 3)
     lost    fraction of the rays lost to rounding, (N,)
     """
 
     def __init__(
         self, surface: Surface, facet: BSDF, solid_angle: float, tracing: Tracing, facet_name: str = ""
     ) -> None:
-        """solid_angle: that of the detector, sr; facet_name: name of the facets' material in the title."""
+        """A rough surface.
+
+        facet        material of the facets
+        solid_angle  solid angle of the detector, sr
+        facet_name   name of the material in the title; by default, its notation
+        """
         check_facet(facet)
         self.surface, self.facet, self.seed, self.device = surface, facet, tracing.seed, tracing.device
         self.half_angle = half_angle(solid_angle)
@@ -144,7 +151,7 @@ class Rough(Specimen):
         self.lost = lost / (each * self.patches)
 
     def _look(self, sums: NDArray[np.float32], sent: int) -> None:
-        """Integrate the maps over the opening about each square: (group, bounces, light, square, channel)."""
+        """Integrate the maps over the aperture about each square: (group, bounces, light, square, channel)."""
         of_light = sums.sum(axis=(4, 5), dtype=np.float64).mean(axis=0) / sent
         self.first, self.later = (np.repeat(one, 3, 1)[:, :3] if one.shape[1] == 1 else one for one in of_light)
         groups, orders, lights, channels = sums.shape[:4]
@@ -153,7 +160,7 @@ class Rough(Specimen):
         for group, one in enumerate(sums):
             collected, self._solid = gathered(one, solid, self.half_angle)
             flat = collected.reshape(orders, lights, channels, -1)
-            # y and -y share one square, hence the factor 0.5; channels last, since lookups read them together
+            # y and -y share one square, hence the factor 0.5; channels are last because lookups read them together
             self._collected[group] = np.moveaxis(flat, 2, 3) * np.float32(0.5 / sent)
         self._collected[groups] = self._collected[:groups].mean(axis=0)
 
@@ -175,7 +182,7 @@ class Rough(Specimen):
         return total / solid[:, None]
 
     def _places(self, wo: Floats, wi: Floats) -> tuple[list[NDArray[np.int64]], list[Floats]]:
-        """Indices of the four squares around wo, and their interpolation weights."""
+        """The indices of the four squares around wo, and their interpolation weights."""
         flat = np.hypot(wi[:, 0], wi[:, 1])
         pole = flat < 1e-9  # at normal incidence every azimuth is equivalent
         some = np.where(pole, 1.0, flat)
@@ -197,7 +204,7 @@ class Rough(Specimen):
 
 
 def check_facet(facet: BSDF) -> None:
-    """Raise InputError if a material cannot be used for facets."""
+    """Raise InputError if a material cannot be used for the facets of a surface."""
     if facet.transmits:
         raise InputError(f"{facet.name} transmits light", "--facet", "facets reflect only: conductor, mirror, ...")
     if not facet.isotropic:
@@ -214,7 +221,7 @@ def is_gray(facet: BSDF) -> bool:
 
 
 def centers(side: int) -> Floats:
-    """Direction of the center of each square, (side, 2 side, 3); centers outside the disk are below the horizon."""
+    """The direction of the center of each square, (side, 2 side, 3). Centers outside the disk are below the horizon."""
     y, x = np.meshgrid((np.arange(side) + 0.5) / side, (np.arange(2 * side) + 0.5) / side - 1.0, indexing="ij")
     square = np.minimum(x * x + y * y, 2.0)
     scale = np.sqrt(2.0 - square)
@@ -222,7 +229,7 @@ def centers(side: int) -> Floats:
 
 
 def projected(side: int) -> Floats:
-    """Projected solid angle of each square above the horizon, (side, 2 side): its area times 2 cos theta."""
+    """The projected solid angle of each square above the horizon, (side, 2 side): its area times 2 cos theta."""
     fine = side * PARTS
     y, x = np.meshgrid((np.arange(fine) + 0.5) / fine, (np.arange(2 * fine) + 0.5) / fine - 1.0, indexing="ij")
     cos = np.maximum(1.0 - x * x - y * y, 0.0)
@@ -230,7 +237,7 @@ def projected(side: int) -> Floats:
 
 
 def gathered(maps: NDArray[np.float32], solid: Floats, half_angle: float) -> tuple[NDArray[np.float32], Floats]:
-    """Sums of maps (..., side, 2 side) and of `solid` over the cone about each square; the latter flattened."""
+    """The sums of maps, (..., side, 2 side), and of `solid`, flattened, over the cone about each square."""
     side = solid.shape[0]
     reach = int(np.ceil(half_angle * side)) + 1
     lowest = np.cos(half_angle)

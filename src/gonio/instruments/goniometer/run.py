@@ -1,4 +1,4 @@
-"""Measure a material or a surface, and write the values."""
+"""Measure a material or a surface, and write the values to a file."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from .readings import Rough, Tracing
 from .specimen import BOUNCES, GROUPS, Model, Specimen
 
 Floats = NDArray[np.float64]
-DETECTOR = 0.006  # sr, a cone with a half angle of 2.5 degrees: the default for surfaces
+DETECTOR = 0.006  # sr, the default for surfaces: a cone with a half angle of 2.5 degrees
 MAX_BLOCKED = 60.0  # degrees
-EXCHANGED = 1 << 12  # pairs of directions at which reciprocity is tested
-SAME = 1e-6  # relative change by swapping the two directions that rounding errors explain
+EXCHANGED = 1 << 12  # number of pairs of directions at which reciprocity is tested
+SAME = 1e-6  # if swapping the two directions changes f by less than this, relative, rounding errors are the cause
 
 
 @dataclass(frozen=True)
 class Detector:
-    """Properties of a detector, from the arguments of `measure`.
+    """The properties of a detector, as given by the arguments of `measure`.
 
-    solid_angle  solid angle of its opening, sr; None for the default of the specimen
+    solid_angle  solid angle of the detector, sr; None for the default of the specimen
     noise        relative standard deviation of a reading
-    blocked      degrees about the lamp where it cannot be placed
-    bounces      the light that it collects, a key of `BOUNCES`
+    blocked      smallest angle between detector and lamp, degrees
+    bounces      the light that the detector collects, a key of `BOUNCES`
     """
 
     solid_angle: float | None
@@ -59,27 +59,27 @@ class Detector:
 
 @dataclass(frozen=True)
 class Readout:
-    """Result of a measurement.
+    """The result of a measurement.
 
-    f is the light that arrives in the cone of the detector divided by the projected solid angle of the cone above the
-    horizon. If a format has few angles of incidence, each is measured; otherwise a grid with the spacing of the
-    detector's half angle, up to 89 degrees, is measured and interpolated linearly. The sample rotates, so the result is
-    isotropic.
+    f is the light that the detector collects, divided by the projected solid angle of the part of its cone that lies
+    above the horizon. If the table has few angles of incidence, each of them is measured. Otherwise, a grid up to 89
+    degrees is measured, whose spacing is the half angle of the detector, and f is interpolated linearly. The sample
+    rotates about its normal, so the result is isotropic.
 
-    table      the values; `table.beside` holds their standard errors ("error") and, for a surface, the part reflected
-               by one facet only ("first")
-    path       the file; None if none was written
+    table      the values; `table.beside` contains their standard errors ("error") and, for a surface, the part of f due
+               to light that was reflected once ("first")
+    path       the file; None if no file was written
     format     format of the file
     cells      number of values in the table
     blocked    fraction of the cells that could not be measured
-    error      median relative standard error; None if values are exact
-    incidence  angles of incidence of the rays, degrees; empty for a material, as are the next three
-    first      fraction of the light that leaves after one facet, luminance
-    later      fraction of the light that leaves after two facets or more, luminance
-    lost       fraction of the rays lost to rounding
+    error      median relative standard error; None if the values are exact
+    incidence  angles of incidence of the rays, degrees; empty for a material, as are `first`, `later` and `lost`
+    first      fraction of the light that leaves after one reflection, by angle of incidence, luminance
+    later      fraction of the light that leaves after two or more reflections, by angle of incidence, luminance
+    lost       fraction of the rays lost to rounding, by angle of incidence
     rays       number of rays
-    seconds    duration of the measurement
-    notes      remarks
+    seconds    duration of the measurement, s
+    notes      remarks on the measurement
     """
 
     table: Measurement
@@ -97,14 +97,14 @@ class Readout:
     notes: tuple[str, ...]
 
     def as_dict(self) -> dict[str, object]:
-        """Dictionary for JSON, without the values."""
+        """The result as a dictionary for JSON, without the values of the table."""
         about = {name: value for name, value in vars(self).items() if name not in ("table", "path")}
         path = None if self.path is None else str(self.path)
         return {"output": path, "title": self.table.title, "kind": self.table.name, **about}
 
 
 class _Pass(Measurement):
-    """Source of values for a table: each query is a measurement."""
+    """The source of values for a table: each call of `rgb` is a measurement."""
 
     def __init__(
         self,
@@ -114,18 +114,22 @@ class _Pass(Measurement):
         part: int | None = None,
         known: dict[int, Floats] | None = None,
     ) -> None:
-        """known: noise-free f by index of the query, for queries whose results are the same in all parts."""
+        """A source of measured values.
+
+        part   index of one of the independent measurements; None for the mean of all
+        known  noise-free f by the number of the call, for calls whose results are the same in all parts
+        """
         super().__init__(specimen.title, specimen.about)
         self._specimen, self._detector, self._seed = specimen, detector, seed
         self._part, self._known = part, {} if known is None else known
         self._asked = 0
 
     def part(self, part: int) -> _Pass:
-        """The same queries, for one part of the measurement."""
+        """The source of values for one independent part of the measurement."""
         return _Pass(self._specimen, self._detector, self._seed, part, self._known)
 
     def first(self) -> _Pass:
-        """The same queries for the first bounce only, without noise."""
+        """The source of values for light reflected once, without noise."""
         return _Pass(self._specimen, replace(self._detector, noise=0.0, bounces="first"), self._seed, None, self._known)
 
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
@@ -137,7 +141,8 @@ class _Pass(Measurement):
             if self._specimen.exact or wo is wi:
                 self._known[self._asked] = f
         if self._detector.noise > 0.0:
-            # adaptive tables derive coordinates from retroreflection: all parts share one set, including its noise
+            # adaptive tables derive their coordinates from retroreflection, so all parts share these values and their
+            # noise
             is_shared = self._part is None or wo is wi
             rng = np.random.default_rng([self._seed, 92, GROUPS if is_shared else self._part or 0, self._asked])
             f = f * (
@@ -147,7 +152,7 @@ class _Pass(Measurement):
 
 
 class _Scout(Measurement):
-    """Records the angles of incidence at which a table queries values."""
+    """Records the angles of incidence at which a table is evaluated."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -180,31 +185,37 @@ def measure(
     device: str = "cpu",
     progress: Callable[[int, int], None] | None = None,
 ) -> Readout:
-    """Measure a material, or a surface built of facets, as a gonioreflectometer does.
+    """Measure a material, or the microgeometry of a rough surface, with a virtual gonioreflectometer.
 
-        go.measure("conductor(alpha=0.2)", "gold.binary")                     # any material into any format
+        go.measure("conductor(alpha=0.2)", "gold.binary")                     # any material, in any format
         go.measure(surface="gaussian:alpha=0.3", facet="mirror", output="rough.gonio")
 
-    material     the material to evaluate, as `go.material` takes it; None to measure a surface
-    output       the file; its suffix selects the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None for no file
-    surface      gaussian, vgroove, spheres, with parameters after a colon; a file of heights; or your own surface
-    facet        material of the facets, as a string or an object: "mirror", "lambert:albedo=0.8", "conductor:Au"; a
-                 string that does not set alpha gives smooth facets (alpha = 0)
-    table        kind of the table in a .gonio file: angles, half-difference, adaptive, specular, samples; "": default
-    theta_i, theta_r, phi  angles to measure, degrees (of light, of view, between them), for .gonio, .astm and .brdf
-    solid_angle  solid angle of the detector, sr, over which f is averaged; None: 0.006 for surfaces, 0 for materials
+    material     the material to evaluate, as for `go.material`; None to measure a surface
+    output       the file to write; its suffix selects the format: .binary, .bsdf, .brdf, .astm, .zbsdf or .gonio. None
+                 writes no file
+    surface      the surface, a triangle mesh: gaussian, vgroove or spheres, with parameters after a colon; a file of
+                 heights; or a `Surface` of your own
+    facet        material of the triangles, as a string or an object: "mirror", "lambert:albedo=0.8", "conductor:Au". If
+                 a string does not set alpha, the facets are smooth (alpha = 0)
+    table        kind of the table in a .gonio file: angles, half-difference, adaptive, specular or samples; "" selects
+                 the default
+    theta_i, theta_r, phi  angles of incidence, viewing angles and azimuths between the two at which to measure,
+                 degrees, for .gonio, .astm and .brdf files
+    solid_angle  solid angle of the detector, sr, over which f is averaged; None selects 0.006 for surfaces and 0 for
+                 materials
     noise        relative standard deviation of a reading
-    blocked      degrees about the lamp where the detector cannot be placed. There, cells of MERL files are invalid and
-                 samples are omitted; other tables hold the value at the rim
-    bounces      for a surface: "all" light, that of the "first" bounce, or that of "later" bounces
+    blocked      smallest possible angle between detector and lamp, degrees. At smaller angles, cells of MERL files are
+                 invalid, samples are omitted, and other tables have the value at this angle
+    bounces      the light to measure from a surface: "all", or that after the "first" or after "later" bounces
     samples      rays per angle of incidence
-    patches      measured patches of a random surface, rounded up to a multiple of 8; errors include their spread
-    seed         seed of the random numbers, 0 if None; the same seed gives the same values
-    device       "cpu", "cuda" or "auto", for surfaces
-    progress     called with the number of rays traced and their total
+    patches      number of patches of a random surface to measure, rounded up to a multiple of 8; the standard errors
+                 include the variation among patches
+    seed         seed of the random numbers, 0 if None; equal seeds give equal values
+    device       device for tracing rays: "cpu", "cuda" or "auto"
+    progress     called with the number of rays traced and their total number
 
-    Returns a `Readout`: the table with a standard error per value, the energy and the time.
-    Raises InputError for unknown, out-of-range or unwritable arguments, before anything is computed.
+    Returns a `Readout`: the table with a standard error per value, the reflected energy, and the duration.
+    Raises InputError for invalid arguments, and if the file cannot be written, before anything is computed.
     """
     begun = time.perf_counter()
     detector = Detector(solid_angle, noise, blocked, bounces)
@@ -238,7 +249,7 @@ def _check_numbers(detector: Detector, tracing: Tracing) -> None:
 
 
 def _rough(surface: Surface | str, facet: MaterialLike, detector: Detector, tracing: Tracing, plan: Plan) -> Rough:
-    """The surface of facets, measured at the angles of incidence of the planned table."""
+    """The rough surface, measured at the angles of incidence of the planned table."""
     built = surface_of(surface) if isinstance(surface, str) else surface
     if not isinstance(built, Surface):
         raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=0.3"')
@@ -262,8 +273,7 @@ def _model(material: MaterialLike | None, detector: Detector) -> Model:
 
 
 def _lost(measured: Measurement, specimen: Specimen) -> list[str]:
-    """Notes on properties of a material that its table cannot have: transmission, and different values for the two
-    orders of a pair of directions."""
+    """Notes on properties of a material that the table cannot represent: transmission, and a lack of reciprocity."""
     if not isinstance(specimen, Model):
         return []
     notes = []
@@ -276,8 +286,8 @@ def _lost(measured: Measurement, specimen: Specimen) -> list[str]:
         return notes
     return [
         *notes,
-        f"exchanging both directions changes f by {100.0 * change:.2g} % on average, but this table holds one value "
-        "for both: their least-squares mean is stored; .bsdf files and .gonio files with --table angles store each",
+        f"swapping the two directions changes f by {100.0 * change:.2g} % on average, but this table has one value "
+        "for both: their least-squares mean. .bsdf files, and .gonio files with --table angles, store both values",
     ]
 
 
@@ -285,7 +295,7 @@ def _written(measured: Measurement, plan: Plan, target: Path) -> list[str]:
     """Write the table; returns notes on what its format cannot store."""
     files.write_whole(target, plan.file.write(measured))
     if "error" in measured.beside and plan.file.writes != "any":
-        return [f"{plan.file.name} files have no place for standard errors; .gonio files store them"]
+        return [f"{plan.file.name} files cannot store standard errors; .gonio files can"]
     return []
 
 
@@ -298,7 +308,7 @@ def _readout(
     notes: Sequence[str],
     begun: float,
 ) -> Readout:
-    """The result of `measure`, with the median relative error and the energy of a surface."""
+    """The result of `measure`, with the median relative standard error and the energy that a surface reflects."""
     rough = specimen if isinstance(specimen, Rough) else None
     error = measured.beside.get("error")
     values = vars(measured)["values"]
@@ -338,7 +348,7 @@ def _filled(plan: Plan, specimen: Specimen, detector: Detector, seed: int) -> tu
     table, hidden, left_out = without(table, detector.blocked_angle)
     notes = []
     if detector.blocked > 0.0 and not left_out:
-        notes.append(f"{table.name} tables have a value everywhere: near the lamp they hold the value at the rim")
+        notes.append(f"{table.name} tables need a value everywhere: near the lamp, it is that at the --blocked angle")
     return table, hidden, notes
 
 
@@ -346,8 +356,8 @@ def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> 
     """A surface from a string: "gaussian", "gaussian:alpha=0.3,length=4", "gaussian(alpha=0.3)", a file of heights, or
     FILE.py:CLASS.
 
-    assignments  further parameters, "name=value" each
-    preset       name of a preset; surfaces have none, so any other than "" is an error
+    assignments  further parameters, each in the form "name=value"
+    preset       must be "", because surfaces have no presets
     """
     if preset:
         raise InputError("surfaces have no presets", "--preset", "such as --facet conductor:Au")
@@ -360,9 +370,10 @@ def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> 
 
 
 def facet_of(text: str) -> BSDF:
-    """The material of facets from its notation, or from short forms such as "conductor:Au" and "lambert:albedo=0.8".
+    """The material of the facets from its notation, or from a short form such as "conductor:Au" or
+    "lambert:albedo=0.8".
 
-    If no alpha is given, it is set to 0 if the model allows that.
+    If no alpha is given, it is set to 0, provided that the model allows this value.
     """
     head, colon, rest = text.strip().partition(":")
     if colon and is_model(head):
@@ -378,6 +389,6 @@ def facet_of(text: str) -> BSDF:
 
 
 def _parted(text: str) -> tuple[str, str]:
-    """("gaussian", "alpha=0.3") from "gaussian:alpha=0.3" or from "gaussian(alpha=0.3)"."""
+    """Split "gaussian:alpha=0.3" or "gaussian(alpha=0.3)" into ("gaussian", "alpha=0.3")."""
     match = re.fullmatch(r"([\w-]+)\s*(?::(.*)|\((.*)\))?", text.strip(), re.DOTALL)
     return (text.strip(), "") if match is None else (match[1], match[2] or match[3] or "")

@@ -1,4 +1,4 @@
-"""Specimens of the goniometer, lit from one direction and measured by a detector in another."""
+"""Specimens of the goniometer, which are lit from one direction and measured by a detector in another direction."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ...errors import InputError
 from ...material import BSDF
 
 Floats = NDArray[np.float64]
-GROUPS = 8  # independent parts of a measurement; their spread gives the standard error
+GROUPS = 8  # number of independent parts of a measurement, from whose spread the standard error is estimated
 BOUNCES = {"all": "all light", "first": "light reflected once", "later": "light reflected twice or more"}
-RINGS = (1, 6, 12, 18)  # points per ring of the detector's opening, of equal area each
+RINGS = (1, 6, 12, 18)  # points per ring of the detector's aperture; each point represents the same area
 
 
 class Specimen:
-    """A scatterer on the goniometer.
+    """An object that the goniometer measures.
 
-    title  title for the file
-    about  settings of the measurement, for the file
-    exact  whether readings have no statistical error, and bounces are not separated
+    title  title to store in the file
+    about  settings of the measurement to store in the file
+    exact  whether readings have no statistical error; bounces are then not separated
     """
 
     title: str
@@ -31,19 +31,19 @@ class Specimen:
     exact: ClassVar[bool] = False
 
     def prepare(self, theta_i: Floats) -> None:
-        """Prepare for these angles of incidence [rad]; `f` is called for no others."""
+        """Prepare for measurements at the given angles of incidence [rad]; `f` is called for no other angles."""
 
     def f(self, wo: Floats, wi: Floats, part: int | None = None, bounces: str = "all") -> Floats:
-        """f averaged over the detector's opening about wo, lit from wi, (N, 3), 1/sr.
+        """f for light from wi, averaged over the aperture of a detector at wo, (N, 3), 1/sr.
 
         part     index of one of `GROUPS` independent measurements; None for the mean of all
-        bounces  a key of `BOUNCES`
+        bounces  the light to measure, a key of `BOUNCES`
         """
         raise NotImplementedError
 
 
 class Model(Specimen):
-    """A material model, evaluated without a surface."""
+    """A material, whose model is evaluated instead of tracing rays."""
 
     exact: ClassVar[bool] = True
 
@@ -70,7 +70,7 @@ class Model(Specimen):
 
 
 def half_angle(solid_angle: float) -> float:
-    """Half angle of a cone with a given solid angle [sr], rad."""
+    """The half angle of a cone [rad] from its solid angle [sr]."""
     return float(np.arccos(1.0 - solid_angle / (2.0 * np.pi)))
 
 
@@ -89,7 +89,7 @@ def opening(solid_angle: float | None) -> Floats:
 
 
 def to_frame(w: Floats, offsets: Floats) -> Sequence[Floats]:
-    """Rotate directions given relative to z to the frames of w, (N, 3) each."""
+    """Rotate directions about z, given as `offsets`, to each of the axes w, (N, 3)."""
     if len(offsets) == 1:
         return [w]
     side = np.where(np.abs(w[:, 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])

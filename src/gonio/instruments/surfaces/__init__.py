@@ -1,1 +1,1 @@
-"""Surfaces that the virtual goniometer can build, one file each."""
+"""Rough surfaces for the virtual goniometer, one kind per file."""

@@ -1,4 +1,4 @@
-"""Base class of surfaces: facets of one period, which repeats infinitely in x and y."""
+"""The base class of rough surfaces. A surface is a triangle mesh of one period, which repeats infinitely in x and y."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Patch:
-    """One period of a surface, as triangles that face upward.
+    """One period of a surface, as a mesh of triangles that face upward.
 
-    vertices  (N, 3); the period spans -size / 2 to size / 2; geometry that crosses a boundary exists on both sides
-    faces     (M, 3), counterclockwise as seen from above
+    vertices  (N, 3). The period extends from -size / 2 to size / 2; geometry that crosses a boundary is repeated on the
+              opposite side
+    faces     (M, 3), indices of the vertices, counterclockwise as seen from above
     size      extent of the period, (x, y)
     top       upper bound of the heights
     """
@@ -43,11 +44,11 @@ class Patch:
 
 
 class Surface:
-    """A kind of rough surface: a frozen dataclass of its parameters (`parameter`), with `patch`.
+    """A kind of rough surface: a frozen dataclass of parameters, which `parameter` declares, with the method `patch`.
 
     name    name on the command line, as in "gaussian:alpha=0.3"
-    random  whether `patch` depends on its random numbers; if so, several patches are measured, and their spread is part
-            of the standard error
+    random  whether `patch` uses random numbers; if so, several patches are measured, and the variation among them is
+            part of the standard error
     """
 
     family: ClassVar[Family[type[Surface]]]
@@ -61,7 +62,7 @@ class Surface:
                 object.__setattr__(self, field.name, _in_range(getattr(self, field.name), field.metadata, where))
 
     def patch(self, rng: np.random.Generator) -> Patch:
-        """One period of the surface; a random surface takes all its random numbers from `rng`."""
+        """One period of the surface. A random surface must take all random numbers from `rng`."""
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -71,7 +72,7 @@ class Surface:
 
     @classmethod
     def reads(cls, text: str) -> bool:
-        """Whether a string names a file with such a surface; its path is then the parameter `file`."""
+        """Whether a string names a file with a surface of this kind; its path is then the parameter `file`."""
         return False
 
 
@@ -81,9 +82,11 @@ Surface.family = Family(
 
 
 def parameter(default: T, doc: str, low: float, high: float, unit: str = "") -> T:
-    """Declare a numeric parameter of a surface: an integer if the default is one. A value of None is preserved.
+    """Declare a numeric parameter of a surface. It is an integer if the default is an integer; None is accepted too.
 
+    doc        description of the parameter
     low, high  bounds of its range
+    unit       unit of the parameter
     """
     about = {"doc": doc, "low": low, "high": high, "unit": unit, "whole": isinstance(default, int)}
     declared: T = dataclasses.field(default=default, metadata=about)
@@ -106,9 +109,9 @@ def _in_range(value: object, about: Mapping[str, Any], where: str) -> object:
 
 
 def named(text: str, settings: dict[str, str]) -> Surface:
-    """A surface from its name or file, and its parameters as strings.
+    """A surface from its name or file, with parameters given as strings.
 
-    Raises InputError, with the nearest known spelling, for unknown names and values out of range.
+    Raises InputError for unknown names, with the closest known name, and for values out of range.
     """
     reader = next((kind for kind in Surface.family.all().values() if kind.reads(text)), None)
     kind = reader or Surface.family.get(text, "--surface")
@@ -125,8 +128,11 @@ def named(text: str, settings: dict[str, str]) -> Surface:
 
 
 def of_heights(heights: Floats, spacing: float = 1.0) -> Patch:
-    """The periodic surface through heights (y, x) on a square grid, with one additional square on each side. Each
-    square has two triangles; the diagonals alternate between neighboring squares, so no direction is preferred."""
+    """The mesh of a periodic surface through heights (y, x) on a square grid, with an additional square on each side.
+
+    Each square is divided into two triangles. The diagonals alternate between neighboring squares, so no direction is
+    preferred.
+    """
     rows, columns = heights.shape
     y, x = np.arange(-1, rows + 2), np.arange(-1, columns + 2)
     z = heights[np.ix_(y % rows, x % columns)]

@@ -1,4 +1,4 @@
-"""A surface of Gaussian heights."""
+"""Random surfaces with a Gaussian distribution of heights."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .base import Floats, Patch, Surface, of_heights, parameter
 
 @dataclass(frozen=True)
 class Gaussian(Surface):
-    """Gaussian heights, correlated by exp(-(d / length)^2): Beckmann's distribution of slopes.
+    """Gaussian heights with the autocorrelation exp(-(d / length)^2), whose slopes have Beckmann's distribution.
 
     The slope of a triangle is a difference of heights and therefore Gaussian on any grid. The heights are scaled to a
-    mean square slope of alpha^2 / 2 along each axis, so alpha is that of Beckmann (Walter2007). The correlation affects
-    only masking: Smith's G assumes independent heights and slopes. The periodic heights are white noise filtered by
-    FFT.
+    mean square slope of alpha^2 / 2 along each axis, so alpha is the width of the Beckmann distribution (Walter2007).
+    The correlation affects only the masking, because Smith's G assumes independent heights and slopes. The periodic
+    heights are white noise filtered by FFT.
     """
 
     name: ClassVar[str] = "gaussian"
@@ -25,7 +25,7 @@ class Gaussian(Surface):
 
     alpha: float = parameter(0.3, "width of Beckmann's distribution, sqrt(2) times the rms slope", 0.0, 3.0)
     length: float = parameter(3.0, "length over which heights are correlated, in squares of the grid", 1.5, 64.0)
-    squares: int = parameter(512, "squares of the grid along each side of the period", 16, 2048)
+    squares: int = parameter(512, "number of grid squares along each side of the period", 16, 2048)
 
     def patch(self, rng: np.random.Generator) -> Patch:
         heights = heights_of(rng.standard_normal((self.squares, self.squares)), self.length)

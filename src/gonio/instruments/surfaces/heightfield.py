@@ -1,4 +1,4 @@
-"""Heights from a file."""
+"""Surfaces from a file of heights."""
 
 from __future__ import annotations
 
@@ -12,29 +12,30 @@ from ...errors import InputError
 from ...pictures import images
 from .base import Floats, Patch, Surface, of_heights, parameter
 
-MIN_PIXELS, MAX_PIXELS = 4, 1024  # pixels along a side
-SEAM = 2.0  # a map counts as periodic if the step from its last row to its first is at most this many RMS steps
+MIN_PIXELS, MAX_PIXELS = 4, 1024  # limits of the number of pixels along each side
+SEAM = 2.0  # a map is periodic if the step from its last row to its first is at most this many times the RMS step
 
 
 @dataclass(frozen=True)
 class Heightfield(Surface):
-    """A map of heights, one value per pixel (.exr, .hdr, .npz): a measured surface, or one that you made.
+    """A map of heights, one value per pixel (.exr, .hdr, .npz), of a measured or artificial surface.
 
-    A map that is not periodic, in that its last row or column does not join its first, is extended by its mirror image.
+    If the map is not periodic, that is, if its last row or column does not join the first, it is extended by its mirror
+    image.
     """
 
     name: ClassVar[str] = "heightfield"
 
     file: str
-    spacing: float = parameter(1.0, "distance of two pixels, in the unit of the heights", 1e-12, 1e12)
-    scale: float = parameter(1.0, "factor on the heights", -1e12, 1e12)
+    spacing: float = parameter(1.0, "distance between two pixels, in the unit of the heights", 1e-12, 1e12)
+    scale: float = parameter(1.0, "factor by which the heights are multiplied", -1e12, 1e12)
 
     @classmethod
     def reads(cls, text: str) -> bool:
         return Path(text).suffix.lower() in (".exr", ".hdr", ".npz")
 
     def patch(self, rng: np.random.Generator) -> Patch:
-        heights = read(self.file) * (self.scale / self.spacing)  # in pixels, as float32 has few digits
+        heights = read(self.file) * (self.scale / self.spacing)  # in units of pixels, because float32 has few digits
         for axis in (0, 1):
             if _jump(heights, axis) > SEAM:
                 heights = np.concatenate([heights, np.flip(heights, axis)], axis)
@@ -57,7 +58,7 @@ def read(file: str) -> Floats:
 
 
 def _jump(heights: Floats, axis: int) -> float:
-    """Ratio of the RMS step from the last row to the first to the RMS step between adjacent rows."""
+    """The RMS step from the last row to the first, divided by the RMS step between adjacent rows."""
     usual = float(np.sqrt(np.mean(np.square(np.diff(heights, axis=axis)))))
     seam = float(np.sqrt(np.mean(np.square(np.take(heights, 0, axis) - np.take(heights, -1, axis)))))
     return seam / usual if usual > 0.0 else float(seam > 0.0) * 2.0 * SEAM

@@ -1,4 +1,4 @@
-"""Hemispheres on a plane."""
+"""Surfaces of hemispheres on a plane."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from ...errors import InputError
 from .base import Floats, Patch, Surface, parameter
 
 SIDE = 16.0  # side length of the period, in radii
-SPLITS = 4  # subdivisions of an icosahedron, each of which splits a facet into four
+SPLITS = 4  # subdivisions of the icosahedron, each of which splits a triangle into four
 TRIES = 200_000
 
 
 @dataclass(frozen=True)
 class Spheres(Surface):
-    """Hemispheres of one size, scattered over a plane without touching: beads half sunk into their binder.
+    """Hemispheres of equal size, distributed randomly on a plane without overlap, like beads half embedded in a binder.
 
-    Each ball is a subdivided icosahedron with a random rotation, so that together they have every normal.
+    Each sphere is a subdivided icosahedron with a random rotation, so the spheres together have normals in all
+    directions.
     """
 
     name: ClassVar[str] = "spheres"
     random: ClassVar[bool] = True
 
-    coverage: float = parameter(0.4, "share of the plane that is covered", 0.0, 0.5)
+    coverage: float = parameter(0.4, "fraction of the plane that is covered", 0.0, 0.5)
 
     def patch(self, rng: np.random.Generator) -> Patch:
         places = self._places(rng)
@@ -49,7 +50,7 @@ class Spheres(Surface):
         return Patch(np.concatenate(vertices), np.concatenate(faces).astype(np.uint32), (SIDE, SIDE), top)
 
     def _places(self, rng: np.random.Generator) -> Floats:
-        """Centers in the period, at least two radii apart."""
+        """The centers of the spheres in one period, at least two radii apart."""
         wanted = round(self.coverage * SIDE * SIDE / np.pi)
         centers = np.empty((0, 2))
         for place in rng.uniform(-0.5 * SIDE, 0.5 * SIDE, (TRIES, 2)):
@@ -66,12 +67,12 @@ _SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0,
 
 @functools.cache
 def _ball() -> tuple[Floats, NDArray[np.int64]]:
-    """Vertices and triangles of a unit sphere; the part below the plane stays hidden."""
+    """The vertices and triangles of a unit sphere, whose lower half is hidden below the plane."""
     hull = ConvexHull(_icosahedron())
     points, faces = hull.points, hull.simplices
     for _ in range(SPLITS):
         corners = points[faces]
-        middles = corners + np.roll(corners, -1, axis=1)  # midpoints of a b, b c, c a
+        middles = corners + np.roll(corners, -1, axis=1)  # midpoints of the edges ab, bc and ca
         middles /= np.linalg.norm(middles, axis=-1, keepdims=True)
         (a, b, c), (ab, bc, ca) = corners.swapaxes(0, 1), middles.swapaxes(0, 1)
         parts = [np.stack(part, 1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]

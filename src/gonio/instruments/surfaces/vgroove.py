@@ -1,4 +1,4 @@
-"""V-grooves: a surface of long symmetric cavities."""
+"""Surfaces of long symmetric V-grooves."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ STEEPEST = np.radians(89.0)
 class VGroove(Surface):
     """Long symmetric V-grooves whose upper edges lie in one plane (Torrance1967, OrenNayar1994).
 
-    The two sides of a groove slope by the same angle theta_a. Grooves of each slope take up the fraction of the surface
-    given by Oren and Nayar's slope-area distribution, exp(-theta_a^2 / (2 sigma^2)) sin theta_a; with `slope`, all have
-    that slope. The sample rotates during the measurement, so grooves run in all directions.
+    The two sides of a groove have the same slope angle theta_a. The fraction of the surface that grooves with a given
+    slope angle cover is Oren and Nayar's slope-area distribution, exp(-theta_a^2 / (2 sigma^2)) sin theta_a. If `slope`
+    is given, all grooves have this slope angle. The sample rotates during the measurement, so the result is an average
+    over all directions of the grooves.
     """
 
     name: ClassVar[str] = "vgroove"
 
-    sigma: float = parameter(0.3, "standard deviation of the slope's angle", 0.0, 1.5, "rad")
-    slope: float | None = parameter(None, "the angle of all slopes, instead of a distribution", 0.0, 1.5, "rad")
+    sigma: float = parameter(0.3, "standard deviation of the slope angle", 0.0, 1.5, "rad")
+    slope: float | None = parameter(None, "slope angle of all grooves, instead of a distribution", 0.0, 1.5, "rad")
 
     def patch(self, rng: np.random.Generator) -> Patch:
         depth = 0.5 * np.tan(self.slopes(GROOVES) if self.slope is None else np.full(GROOVES, self.slope))
@@ -41,7 +42,7 @@ class VGroove(Surface):
         return Patch(vertices, faces, (float(GROOVES), float(GROOVES)), 0.0)
 
     def slopes(self, count: int) -> Floats:
-        """Slope angles that divide the distribution into equal fractions."""
+        """The slope angles of `count` grooves, which divide the distribution into equal fractions."""
         theta = np.linspace(0.0, STEEPEST, 1 << 14)
         density = np.exp(-0.5 * np.square(theta / max(self.sigma, 1e-9))) * np.sin(theta)
         total = np.cumsum(density)

@@ -20,7 +20,7 @@ class Mix(BSDF):
 
     a: BSDF = bsdf("the material at weight 0")
     b: BSDF = bsdf("the material at weight 1")
-    weight: Number = number(default=0.5, doc="fraction of b", low=0.0, high=1.0)
+    weight: Number = number(default=0.5, doc="weight of b", low=0.0, high=1.0)
 
     limits: ClassVar[tuple[Limit, ...]] = (
         Limit({"weight": 0.0}, equals=lambda one: one.a),
@@ -34,13 +34,13 @@ class Mix(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Mixture of the two densities."""
+        """The weighted average of the two densities."""
         return self.a.pdf(wo, wi) * (1.0 - self.weight) + self.b.pdf(wo, wi) * self.weight
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u.x selects a material and is rescaled for it. Unless the sample is from a delta lobe, its pdf is that of the
-        mixture."""
+        """u.x selects a material and is then rescaled. The pdf is that of the mixture, except for samples of a delta
+        lobe."""
         w = self.weight
         pick_b = u.x < w
         u_remapped = where(pick_b, safe_div(u.x, w), safe_div(u.x - w, 1.0 - w))

@@ -15,7 +15,7 @@ from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, dot, maximum, minimum, safe_div, sqr, vec3, where
 
 STEEPEST = 20.0  # maximum slope of a map, the tangent of 87 degrees
-MIN_COSINE = 0.01  # minimum cosine of a view to the bent normal, unless that to the surface normal is smaller
+MIN_COSINE = 0.01  # minimum cosine of wo to the bent normal, unless its cosine to the surface normal is smaller
 
 
 class _Frame(NamedTuple):
@@ -35,22 +35,23 @@ class _Frame(NamedTuple):
 
 
 class NormalMap(BSDF):
-    """A base material with a tilted shading normal, n' = (lean_x, lean_y, 1), normalized.
+    """A base material with a tilted shading normal n', which is the normalized vector (lean_x, lean_y, 1).
 
-    In scenes, the image under the key `"normalmap"` gives the normals.
+    In scenes, the normals are read from the image under the key `"normalmap"`.
 
     f cos theta_i = b(o, i) + b(o, i*), where b is `eval` of the base in the frame of n', and i* = (i_x, i_y, -i_z)
 
-    Surfaces with tilted normals usually turn black at grazing angles, for two reasons, both of which are corrected
-    here. First, the view direction may lie behind the tilted base; n' is then bent toward the view, as little as
-    necessary (Keller2017 does this for the mirrored view). Second, the base scatters light below the surface:
-    (1 - n'.n) / 2 of it for a white diffuse base, with n the normal of the surface. This light is reflected upward
-    again, as by neighboring facets. A white base thus remains white at any tilt, and no light is created. If the base
-    transmits, n' is bent, but light that leaves on the wrong side is lost. The model is not reciprocal, because n'
-    depends on the view. Scattered light is unpolarized.
+    Surfaces with tilted normals usually turn black at grazing angles for two reasons, both of which are corrected here.
+    First, the view direction may lie behind the tilted base; n' is then bent toward the view direction by no more than
+    necessary (Keller2017 applies this correction to the mirrored view direction). Second, the base scatters part of the
+    light below the surface: the fraction (1 - n'.n) / 2 for a white diffuse base, where n is the surface normal. This
+    light is reflected upward again, as if by neighboring facets. A white base therefore remains white at any tilt, and
+    no energy is gained. If the base transmits, n' is bent in the same way, but light that leaves on the wrong side is
+    lost. The model is not reciprocal, because n' depends on the view direction. The scattered light is unpolarized.
 
-    A surface of two facets (Schuessler2017) conserves energy as well. If the second facet is a mirror, however, diffuse
-    bumps become invisible: viewed from above, their brightness is n'.n cos theta_i in whichever direction they tilt.
+    The microfacet-based normal map of Schuessler2017, which adds a second facet, also conserves energy. If that facet
+    is a mirror, however, diffuse bumps become invisible: seen from above, their brightness is n'.n cos theta_i,
+    regardless of the direction in which they are tilted.
     """
 
     base: BSDF = bsdf("the material whose normal is tilted")
@@ -60,8 +61,8 @@ class NormalMap(BSDF):
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"lean_x": 0.0, "lean_y": 0.0}, equals=lambda one: one.base),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "a normal that faces away from the view is bent toward it, and light that an opaque base scatters below "
-            "the surface is reflected upward",
+            "a normal that faces away from wo is bent toward wo, and light that an opaque base scatters below the "
+            "surface is reflected upward",
             lambda model: 2.0 if model.perturbs_normal else 0.0,
             certain=False,
         ),
@@ -79,7 +80,7 @@ class NormalMap(BSDF):
         return vec3(n_x, n_y, over)
 
     def _frame(self, n: Direction) -> _Frame:
-        """The frame of n, computed from the slopes of n, since 1 - n.x^2 would cancel for a steep n."""
+        """The frame of n, computed from the slopes of n, because 1 - n.x^2 would cancel for a steep n."""
         a, b = n.x / n.z, n.y / n.z
         x = vec3(1.0 + sqr(b), -(a * b), -a)
         x = x * ops.rsqrt((1.0 + sqr(b)) * (1.0 + sqr(a) + sqr(b)))
@@ -89,7 +90,7 @@ class NormalMap(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The base in the bent frame, plus the light that it scatters below the surface."""
+        """The value of the base in the bent frame, plus the light that the base scatters below the surface."""
         frame, valid = self._bent(wo)
         o, i = frame.local(wo), frame.local(wi)
         value = self.base.eval(o, i, mode)
@@ -144,8 +145,8 @@ class NormalMap(BSDF):
 
     @property
     def perturbs_normal(self) -> bool:
-        """Whether its normal, or that of the base, may differ from the surface's. Tilts that are the plain number 0
-        leave the normal unchanged."""
+        """Whether the shading normal, here or in the base, may differ from the surface normal. A tilt given as the
+        plain number 0 leaves the normal unchanged."""
         values = [getattr(self.plain, name) for name in ("lean_x", "lean_y")]
         return self.base.perturbs_normal or not all(isinstance(value, int | float) and value == 0 for value in values)
 
@@ -155,7 +156,7 @@ class NormalMap(BSDF):
 
     @property
     def isotropic(self) -> bool:
-        if isinstance(self.lean_x, ops.Node):  # the tilt of a recording is unknown
+        if isinstance(self.lean_x, ops.Node):  # the tilt is unknown in a recording
             return False
         return not self.perturbs_normal and self.base.isotropic
 
@@ -181,16 +182,16 @@ def _flipped(w: Direction) -> Direction:
 class Bump(NormalMap):
     """A base material whose shading normal is that of a height field (Blinn1978).
 
-    In scenes, the image under the key `"bump"` gives the heights.
+    In scenes, the heights are read from the image under the key `"bump"`.
 
     The height h(u, v) is in scene units and has the derivatives h_u and h_v. With dp/du = (l, 0) and dp/dv = (s, m) in
-    the tangent plane, its gradient is g = (h_u / l, (h_v - s h_u / l) / m), and n' = (-g, 1), normalized. Outside
-    scenes, where dp/du and dp/dv are unknown, they are taken to be x and y. In all other respects, this material is
-    identical to `normal-map`.
+    the tangent plane, the gradient of h is g = (h_u / l, (h_v - s h_u / l) / m), and n' is the vector (-g, 1),
+    normalized. Outside scenes, where dp/du and dp/dv are unknown, they are taken to be the x and y axes. In all other
+    respects, this material is identical to `normal-map`.
     """
 
-    lean_x: Number = number(default=0.0, doc="h_u, derivative of the height with respect to u", low=-1e6, high=1e6)
-    lean_y: Number = number(default=0.0, doc="h_v, derivative of the height with respect to v", low=-1e6, high=1e6)
+    lean_x: Number = number(default=0.0, doc="h_u, the derivative of the height with respect to u", low=-1e6, high=1e6)
+    lean_y: Number = number(default=0.0, doc="h_v, the derivative of the height with respect to v", low=-1e6, high=1e6)
 
     reads_surface: ClassVar[bool] = True
 
@@ -207,6 +208,6 @@ class Bump(NormalMap):
 def slopes(normals: np.ndarray, scale: float = 1.0) -> np.ndarray:
     """The parameters `lean_x` and `lean_y` of `normal-map`, (..., 2), for normals (..., 3).
 
-    scale  factor on the slopes
+    scale  factor by which the slopes are multiplied
     """
     return np.clip(scale * normals[..., :2] / np.maximum(normals[..., 2:], 1.0 / STEEPEST), -STEEPEST, STEEPEST)

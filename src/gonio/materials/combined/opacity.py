@@ -16,10 +16,10 @@ from .mix import ALMOST_ONE
 
 
 class Opacity(BSDF):
-    """The base on a fraction `opacity` of the surface, and holes elsewhere, through which light from either side passes
-    straight and unchanged, as a delta lobe. A texture of zeros and ones represents cutouts such as leaves and fences;
-    values in between represent fabrics with unresolved holes. A base that only reflects is black from below unless it
-    is wrapped in `two-sided`.
+    """A base material that covers a fraction `opacity` of the surface. The rest consists of holes, through which light
+    from either side passes straight and unchanged, as a delta lobe. A texture of zeros and ones represents cutouts such
+    as leaves and fences; intermediate values represent fabrics with unresolved holes. A base that only reflects is
+    black from below unless it is wrapped in `two-sided`.
     """
 
     base: BSDF = bsdf("the material between the holes")
@@ -39,7 +39,7 @@ class Opacity(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u.x selects the base with probability `opacity`, which cancels in the weight, and is rescaled for it."""
+        """u.x selects the base with probability `opacity`, which cancels in the weight, and is then rescaled."""
         covered = u.x < self.opacity
         s = self.base.sample(wo, vec3(minimum(safe_div(u.x, self.opacity), ALMOST_ONE), u.y, u.z), mode)
         through = 1.0 - self.opacity

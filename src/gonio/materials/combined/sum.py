@@ -14,17 +14,17 @@ from ...ops import Direction, Mask, Mode, Spectrum
 
 
 class Sum(BSDF):
-    """a + b: the sum of two materials, as in fits to measurements, such as "lambert+conductor" (Ngan2005).
+    """a + b: the sum of two materials, which is used in fits to measurements, such as "lambert+conductor" (Ngan2005).
 
-    Together, the two can reflect more light than they receive. They are sampled by a guide (a tabulated density). A
-    material that consists of a delta lobe is rejected, since its `eval` is 0.
+    The sum can reflect more light than it receives. It is sampled by a guide, a density tabulated from `eval`. A
+    material that consists only of a delta lobe is rejected, because its `eval` is 0.
     """
 
     a: BSDF = bsdf("the first material")
     b: BSDF = bsdf("the second material")
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": KnownViolation("together, the two materials may reflect more than they receive", 1e3, certain=False)
+        "energy": KnownViolation("the sum of the two materials may reflect more light than arrives", 1e3, certain=False)
     }
 
     def __post_init__(self) -> None:

@@ -15,9 +15,9 @@ from ...ops import Direction, Mask, Mode, Scalar, Spectrum, function, vec3, wher
 
 
 class TwoSided(BSDF):
-    """The base material on both sides: it looks the same from behind as from the front. The base must not transmit."""
+    """A base material applied to both sides of a surface, which then look the same. The base must not transmit."""
 
-    base: BSDF = bsdf("the material, which must not transmit")
+    base: BSDF = bsdf("the material on both sides; it must not transmit")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -30,12 +30,12 @@ class TwoSided(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The base's value, with both directions mirrored to wo's side."""
+        """The value of the base. Both directions are mirrored if wo is below the surface."""
         return self.base.eval(_toward_front(wo, wo), _toward_front(wi, wo), mode)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's density, with the same mirroring."""
+        """The density of the base, with the directions mirrored as in `eval`."""
         return self.base.pdf(_toward_front(wo, wo), _toward_front(wi, wo))
 
     @method
@@ -45,7 +45,7 @@ class TwoSided(BSDF):
         return Sample(_toward_front(s.wi, wo), s.weight, s.pdf, s.delta, s.eta)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The base's parts, mirrored back."""
+        """The polarized parts of the base, mirrored back."""
         parts = self.base.polarized(_toward_front(wo, wo), _toward_front(wi, wo), delta, mode)
         return tuple(part._replace(normal=_toward_front(part.normal, wo)) for part in parts)
 

@@ -1,4 +1,4 @@
-"""Base classes of the compensated materials: a base material plus a broad lobe that returns the energy lost by it."""
+"""Base classes of the compensated materials: a base material plus a broad lobe that returns its lost energy."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ class AllParts(NamedTuple):
 
 
 class _OnBase(BSDF):
-    """A material that compensates for the energy lost by its base and otherwise has the base's properties."""
+    """A material that compensates for the energy lost by its base and otherwise has the properties of the base."""
 
-    base: BSDF = bsdf("the material to be compensated")
+    base: BSDF = bsdf("the material whose energy loss is compensated")
     _takes_glass: ClassVar[bool] = True  # whether the base may transmit
-    _loss: ClassVar[float | None] = 2e-3  # allowed in a white furnace for one width; None for no claim
-    _takes_any: ClassVar[bool] = False  # whether it may be something other than a microsurface
+    _loss: ClassVar[float | None] = 2e-3  # allowed in a white furnace if isotropic; None if not claimed
+    _takes_any: ClassVar[bool] = False  # whether the base may be something other than a microsurface
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -64,7 +64,7 @@ class _OnBase(BSDF):
 
     @property
     def anisotropic(self) -> bool:
-        """Whether the base has two different widths."""
+        """Whether the base has different widths along x and y."""
         return reflecting.has_two_widths(self.plain.base)
 
     @property
@@ -81,7 +81,7 @@ class _OnBase(BSDF):
         return self.base.delta
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The polarized parts of the base, which are scattered once; the compensation is unpolarized."""
+        """The polarized parts of the base, which represent light scattered once; the compensation is unpolarized."""
         return self.base.polarized(wo, wi, delta, mode)
 
     def tint(self, wo: Direction) -> Spectrum:
@@ -90,7 +90,7 @@ class _OnBase(BSDF):
 
 
 class _Compensated(_OnBase):
-    """A base plus the energy lost by it, sampled by a mixture of the base and a lobe proportional to that energy.
+    """A base plus its lost energy, sampled by a mixture of the base and a lobe proportional to the lost energy.
 
     A subclass defines `compensation`, an `eval` that adds it to the base, and `derive`, whose result has the fields
     `missing` and `ratio`.
@@ -132,13 +132,14 @@ class _Compensated(_OnBase):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The mixture of the base's density and one proportional to (1 - E(mu_i)) mu_i, weighted by their energies."""
+        """A mixture of the density of the base and one proportional to (1 - E(mu_i)) mu_i, weighted by the energies of
+        both."""
         share = self._share(wo)
         return self.base.pdf(wo, wi) * (1.0 - share) + self._lobe_pdf(wo, wi) * share
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u.x selects the base or the broad lobe, and is rescaled."""
+        """u.x selects the base or the broad lobe and is then rescaled."""
         share = self._share(wo)
         broad = u.x < share
         u_remapped = where(broad, safe_div(u.x, share), safe_div(u.x - share, 1.0 - share))
@@ -154,7 +155,7 @@ class _Compensated(_OnBase):
         value = base_value + self.compensation(wo, wi, mode)
         value = value * where((pdf > 0.0) & ~delta, safe_div(1.0, pdf), 0.0)
         eta = where(broad, self.derived.missing.eta(wo, wi), s.eta)
-        # a smooth base loses nothing: share = 0
+        # a smooth base loses no energy, so `share` is 0
         return Sample(wi, where(delta, s.weight * safe_div(1.0, 1.0 - share), value), pdf, delta, eta)
 
     @function
@@ -164,13 +165,13 @@ class _Compensated(_OnBase):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction with the density `_lobe_pdf`: mu^2 from a table of its inverse distribution, and a uniform
-        azimuth."""
+        """A direction with the density `_lobe_pdf`: mu^2 is read from a table of its inverse distribution function, and
+        the azimuth is uniform."""
         return self.derived.missing.sample(wo, u)
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of the broad lobe: its fraction of the total power, for the mean color."""
+        """Probability of the broad lobe: its fraction of the total power, averaged over the channels."""
         lost = self.derived.missing.given(wo)
         given = lost * self.derived.ratio
         return safe_div(given, given + maximum(1.0 - lost, 0.0))
@@ -186,7 +187,7 @@ def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi
 
 @function
 def lobe_ratio(f_add: Spectrum, lost: MissingEnergy) -> Scalar:
-    """The mean over the channels of the compensation's color, divided by that of single scattering."""
+    """The color of the compensation divided by the color of single scattering, each averaged over the channels."""
     return safe_div(mean(f_add), maximum(mean(lost.F_avg * lost.factor), 1e-6))
 
 

@@ -1,4 +1,4 @@
-"""Comparison of the compensations: remaining loss, distance to the random walk, violated laws and cost."""
+"""Comparison of the compensation methods: remaining loss, difference from the random walk, violated laws and cost."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from .kulla_conty import KullaConty
 from .random_walk import RandomWalk
 from .turquin import Turquin
 
-Method = Callable[[BSDF], "BSDF | None"]  # base -> the compensated base, None if the method does not support it
+Method = Callable[[BSDF], "BSDF | None"]  # base -> compensated base; None if it is not supported
 Base = Callable[[float], BSDF]  # width alpha -> the base
 
 
 def _for_metals(compensate: Callable[[BSDF], BSDF]) -> Method:
-    """A method restricted to bases that only reflect: it does not support glass, or would give the same result as
-    another, since the albedo of glass is 1."""
+    """A method restricted to bases that only reflect. It either does not support glass or gives the same result for
+    glass as another method, because the albedo of glass is 1."""
     return lambda base: None if base.transmits else compensate(base)
 
 
@@ -48,7 +48,8 @@ BASES: dict[str, Base] = {
 
 
 def _with(own: Sequence[BSDF]) -> tuple[dict[str, Method], dict[str, Base]]:
-    """The methods and bases, including the user's: a material with a base is a method, any other is a base."""
+    """The methods and bases, including the user's: a material that has a base is a method; any other material is a
+    base."""
     methods, bases = dict(METHODS), dict(BASES)
     for material in own:
         if "base" in tree.children(material):
@@ -84,14 +85,14 @@ def compare(
     seed: int = 0,
     own: Sequence[BSDF] = (),
 ) -> dict[str, Any]:
-    """Compare all methods of compensation on all bases: albedos on a grid of roughness and mu, errors and cost.
+    """Compare all compensation methods for all bases: albedos on a grid of roughness and mu, errors and cost.
 
     roughness, mu  axes of the grid: roughness (alpha = roughness^2), and mu = cos theta_o
     walks          number of random walks per albedo, 1000 or more
     pairs          number of pairs of directions that are evaluated for `cost`, 1024 or more
     seed           seed of the random walks and of the directions for `reciprocity`
-    own            user materials: one with a base is a method, any other a base, with a random walk if it has facets
-    Returns a dict that can be stored as JSON, with the first three arguments and
+    own            user materials: one that has a base is a method; any other is a base (the walk requires facets)
+    Returns a dict that can be stored as JSON. It contains the first three arguments and
     albedo       [base][method], (roughness, mu, 3)
     rms          [base][method], RMS difference of the albedos from those of the random walk
     furnace      [base][method], largest |1 - albedo|, for the lossless bases
@@ -158,8 +159,8 @@ def _on_gold(method: Method, alpha: float) -> BSDF:
 
 
 def _costs(methods: Mapping[str, Method], pairs: int) -> dict[str, float]:
-    """The time of `eval` divided by that of the uncompensated metal, per method, for gold with alpha = 0.36 and pairs
-    of directions above the surface. Times are the best of 24 runs."""
+    """The time of `eval` for each method, divided by the time for the uncompensated metal. The base is gold with
+    alpha = 0.36, and the pairs of directions are above the surface. Each time is the shortest of 24 runs."""
     dr = backend.drjit()
     kind = backend.types("float32")
     rng = np.random.default_rng(1)

@@ -35,13 +35,13 @@ class Derived(NamedTuple):
 
 
 class FdezAguera(_Compensated):
-    """f_base + F_ms E_ms / pi: multiple scattering, approximated by a diffuse lobe (FdezAguera2019).
+    """f = f_base + F_ms E_ms / pi: multiple scattering is approximated by a diffuse lobe (FdezAguera2019).
 
-    A and B are the coefficients of the split sum, functions of mu_o = cos theta_o and alpha; F0 is the reflectance at
-    normal incidence. With FssEss = F0 A + B, Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21:
-    F_ms = FssEss F_avg / (1 - E_ms F_avg). The method was designed for prefiltered lighting,
-    FssEss * radiance + F_ms E_ms * irradiance. As a BSDF, the second term is a diffuse lobe that depends on wo only, so
-    the model is not reciprocal. It assumes Schlick's approximation of F.
+    A and B are the coefficients of the split sum, which are functions of mu_o = cos theta_o and alpha; F0 is the
+    reflectance at normal incidence. With FssEss = F0 A + B, Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21,
+    the color of the lobe is F_ms = FssEss F_avg / (1 - E_ms F_avg). The method was designed for prefiltered lighting,
+    where it computes FssEss * radiance + F_ms E_ms * irradiance. In a BSDF, the second term becomes a diffuse lobe that
+    depends on wo only; the model is therefore not reciprocal. The method assumes Schlick's approximation of F.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
@@ -61,7 +61,7 @@ class FdezAguera(_Compensated):
         E_ms = self.M(wo)
         surface = self.base.microsurface
         assert surface is not None, "checked on construction"
-        _, smooth = widths(surface.alpha)  # a mirror loses nothing; the polynomials of E_ms end near 0, not at 0
+        _, smooth = widths(surface.alpha)  # a mirror loses no light, but E_ms ends near 0, not at 0
         FssEss = split_sum.reflected(surface, f0, 1.0 - E_ms, wo)
         F_ms = FssEss * f_avg / maximum(1.0 - f_avg * E_ms, 1e-6)
         return F_ms * where(lobe.above(wo, wi) & ~smooth, E_ms * abs(wi.z) * ops.inv_pi, 0.0)

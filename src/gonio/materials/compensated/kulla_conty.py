@@ -15,7 +15,7 @@ from ...optics.fresnel.artist import AVERAGES
 from ._compensated import GAIN_OF_TWO_WIDTHS, _Compensated, lobe_ratio
 
 COLORS = {
-    "sheet": "F_avg E_avg / (1 - F_avg (1 - E_avg)), as in the homework and the talk",
+    "sheet": "F_avg E_avg / (1 - F_avg (1 - E_avg)), as in the homework and in Kulla2017",
     "bounce": "F_avg^2 E_avg / (1 - F_avg (1 - E_avg)): only light that is reflected twice or more",
 }
 
@@ -35,7 +35,7 @@ class Derived(NamedTuple):
 
 @function
 def f_add(lost: MissingEnergy, color: str) -> Spectrum:
-    """The color f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017), or F_avg times this.
+    """The color f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017), or F_avg times this value.
 
     lost   the energy lost by the base, with F_avg
     color  "sheet" for the formula above, "bounce" for F_avg times its value
@@ -46,27 +46,27 @@ def f_add(lost: MissingEnergy, color: str) -> Spectrum:
 
 
 class KullaConty(_Compensated):
-    """f_base + f_add f_ms: the light that single scattering loses is added back as a broad lobe (Kulla2017).
+    """f = f_base + f_add f_ms: the light lost by single scattering is restored by a broad lobe (Kulla2017).
 
-    E(mu) is the albedo of the base at F = 1 for mu = cos theta, E_avg = 2 int E mu dmu and F_avg = 2 int F mu dmu.
-    f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)), whose albedo is 1 - E(mu_o); f_add depends on `color`. At
-    F = 1, no light is lost. The model is reciprocal. As alpha -> 0, the term vanishes: (1 - E)^2 tends to 0 faster than
-    1 - E_avg.
+    E(mu) is the albedo of the base at F = 1 for mu = cos theta, with E_avg = 2 int E mu dmu and F_avg = 2 int F mu dmu.
+    The lobe f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)) has the albedo 1 - E(mu_o), and its color f_add is
+    determined by `color`. At F = 1, no light is lost. The model is reciprocal. As alpha -> 0, f_ms vanishes, because
+    (1 - E)^2 tends to 0 faster than 1 - E_avg.
 
-    For a conductor or a dielectric, E is a short polynomial accurate to 1e-4 (`compensation.curves`), valid for any
-    alpha, including textures and gradients. A dielectric that transmits has a reflected and a transmitted lobe on each
-    side, whose albedos sum to 1 - E, where E includes the reflected and the transmitted power; the ratio of the two
-    lobes follows from reciprocity (Kulla2017, p. 30).
+    For a conductor or a dielectric, E is a short polynomial that is accurate to 1e-4 for any alpha
+    (`compensation.curves`); textures and gradients are supported. For a dielectric that transmits, E includes the
+    reflected and the transmitted power. The compensation then consists of a reflected and a transmitted lobe on each
+    side, whose albedos sum to 1 - E; their ratio follows from reciprocity (Kulla2017, p. 30).
 
-    The albedo of any other base that only reflects, by a finite isotropic lobe, is computed once
-    (`compensation.measured`): E is the albedo with F = 1 and with every color that represents a fraction of light set
-    to 1; F_avg is the ratio of the actual albedo to E. By this definition, Lambert loses nothing; Oren-Nayar loses the
-    interreflections; a material without such colors, such as Phong, loses all light that its brightest channel does not
-    reflect. If the base gains energy, the gain is not corrected. The parameters of such a base must not vary over the
-    surface, and there is no shader code.
+    Any other base must be a finite isotropic lobe that only reflects; its albedo is computed once
+    (`compensation.measured`). E is then the albedo with F = 1 and with every color that represents a fraction of the
+    light set to 1, and F_avg is the ratio of the actual albedo to E. By this definition, Lambert loses no light, and
+    Oren-Nayar loses the interreflected light; a material without such colors, such as Phong, loses all light that its
+    brightest channel does not reflect. An energy gain of the base is not corrected. The parameters of such a base must
+    not vary over the surface, and no shader code is available.
 
-    With the masking term schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = 0.835 at roughness 0.05), so the
-    compensation adds a spurious bright rim to smooth surfaces.
+    With the masking term schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = 0.835 at roughness 0.05); the
+    compensation then adds a spurious bright rim to smooth surfaces.
     """
 
     color: str = choice(default="bounce", doc="color of the compensation", choices=COLORS)
@@ -82,8 +82,8 @@ class KullaConty(_Compensated):
     def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
         """f_add f_ms |cos theta_i|, f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)) (Kulla2017).
 
-        M is 1 - E, computed without taking this difference, and `over_average` is 1 / (pi (1 - E_avg)). For glass,
-        `share` divides the lobe between the two sides (p. 30).
+        M is 1 - E, computed without this subtraction, and `over_average` is 1 / (pi (1 - E_avg)). For glass, `share`
+        divides the lobe between the two sides (p. 30).
         """
         lost = self.derived.missing
         f_ms = self.M(wo) * self.M(wi) * lost.over_average(wi) * lost.share(wo, wi)
@@ -97,20 +97,20 @@ class KullaConty(_Compensated):
 
     @property
     def needs_uniform(self) -> bool:
-        """Whether the base has no tables, so that it is measured once for all rays."""
+        """Whether the base has no tables, so that its albedo is computed once for all rays."""
         return self.base.microsurface is None
 
     # ------------------------------------------------------------------ measured error bounds
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "gradients": KnownViolation(
-            "the albedo of a base without tables is estimated again for each value, by samples whose choice of a lobe "
-            "may change E by 1e-4",
+            "for a base without tables, the albedo is estimated anew for each parameter value, and samples that choose "
+            "another lobe may change E by 1e-4",
             lambda model: 2.0 if model.needs_uniform else 0.0,
             certain=False,
         ),
         "precision": KnownViolation(
-            "the albedo of a base without tables is estimated separately in each precision",
+            "for a base without tables, the albedo is estimated separately in each precision",
             lambda model: 0.01 if model.needs_uniform else 0.0,
             certain=False,
         ),
@@ -127,18 +127,18 @@ class KullaConty(_Compensated):
         if self.base.transmits and self.anisotropic:
             return 0.2
         if self.base.transmits:
-            return 0.015  # near eta = 1.02; 4e-3 from 1.1 on, 2e-3 from 1.3 on
+            return 0.015  # near eta = 1.02; 4e-3 if eta >= 1.1, 2e-3 if eta >= 1.3
         return super().lossless_tolerance
 
 
 def _furnace_error(model: KullaConty) -> float:
-    """The largest error in a white furnace, measured for 21 indices from 0.2 to 5, eight widths and 18 views. If the
-    indices of the two sides differ by less than 6 %, the lobe is narrower than the steps of the table, which increases
-    the error. Anisotropic glass is approximated by isotropic tables (`curves.widths_along`)."""
+    """The largest error in a white furnace, measured for 21 indices from 0.2 to 5, eight widths and 18 view directions.
+    If the indices of the two sides differ by less than 6 %, the lobe is narrower than the steps of the table, which
+    increases the error. Anisotropic glass is approximated by isotropic tables (`curves.widths_along`)."""
     if not model.base.transmits:
         return GAIN_OF_TWO_WIDTHS if model.anisotropic else 0.0
     if model.anisotropic:
-        return 0.15  # 0.02 from outside if one width is up to four times the other
+        return 0.15  # 0.02 for light from outside if one width is at most four times the other
     surface = model.base.microsurface
     near = (
         surface is not None

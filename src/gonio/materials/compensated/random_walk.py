@@ -17,13 +17,13 @@ from .kulla_conty import Derived, f_add
 
 
 class RandomWalk(_Compensated):
-    """f_base + the light of two or more bounces, estimated by one walk per call (Heitz2016).
+    """f_base plus light that bounces twice or more, estimated by one random walk per call (Heitz2016).
 
-    The expectation is the exact multiple scattering of a Smith microsurface: `eval` and the weight are random
-    estimates, generated from a hash of the two directions and `seed`. A renderer uses new directions for each sample
-    and needs no seed; for independent estimates at one pair of directions, pass an array as `seed`. The base must have
-    the ndf "ggx" and the masking term "smith-correlated". The method is slow and noisy; it is intended as a reference.
-    The walk cannot be recorded, so there is no shader code.
+    `eval` and the sample weight are random estimates whose expectation is the exact multiple scattering of a Smith
+    microsurface. The random numbers are generated from a hash of the two directions and `seed`. A renderer uses new
+    directions for each sample and needs no seed; for independent estimates at the same pair of directions, pass an
+    array as `seed`. The base must have the ndf "ggx" and the masking term "smith-correlated". The method is slow and
+    noisy and is intended as a reference. The walk cannot be recorded, so no shader code is available.
     """
 
     stochastic: ClassVar[bool] = True
@@ -39,11 +39,11 @@ class RandomWalk(_Compensated):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The base, plus an estimate of the light of two or more bounces."""
+        """The base, plus an estimate of the light that bounces twice or more."""
         return self.base.eval(wo, wi, mode) + self.compensation(wo, wi, mode)
 
     def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
-        """The light of two or more bounces that one walk scatters along wi, times |cos theta_i|."""
+        """The light that one walk scatters along wi after two or more bounces, times |cos theta_i|."""
         surface = self.base.microsurface
         assert surface is not None, "checked on construction"
         alpha, smooth = widths(surface.alpha)

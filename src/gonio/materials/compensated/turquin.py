@@ -26,16 +26,16 @@ class Derived(NamedTuple):
 
 
 class Turquin(_OnBase):
-    """f_base (1 + F0 (1 - E(mu_o)) / E(mu_o)): the lobe of single scattering, scaled up (Turquin2019, eq. 16).
+    """f = f_base (1 + F0 (1 - E(mu_o)) / E(mu_o)): the single-scattering lobe, scaled up (Turquin2019, eq. 16).
 
     E(mu) is the albedo of the base at F = 1, and F0 is the reflectance at normal incidence. At F = 1, no light is lost.
-    The compensation has the shape of the lobe, so sampling is unchanged. The factor depends on wo only, so the model is
-    not reciprocal.
+    The factor preserves the shape of the lobe, so sampling is unchanged. The model is not reciprocal, because the
+    factor depends on wo only.
     """
 
-    base: BSDF = bsdf("the material to be compensated; it must not transmit")
+    base: BSDF = bsdf("the material whose energy loss is compensated; it must not transmit")
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "reciprocity": KnownViolation("the factor depends on the view direction only", 4.0, certain=False),
+        "reciprocity": KnownViolation("the compensation factor depends on the view direction only", 4.0, certain=False),
         "energy": INTERPOLATED,
     }
     _takes_glass: ClassVar[bool] = False
@@ -77,7 +77,7 @@ class Turquin(_OnBase):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The density of the base, since the factor preserves the shape of the lobe."""
+        """The density of the base, because the factor preserves the shape of the lobe."""
         return self.base.pdf(wo, wi)
 
     @method

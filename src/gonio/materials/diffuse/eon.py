@@ -22,16 +22,16 @@ from .lambert import Lambert
 # of G / pi (Portsmouth2025, eq. 17 and 21).
 GRAZING = 0.5 - 2.0 / (3.0 * math.pi)
 AVERAGE = 2.0 / 3.0 - 28.0 / (15.0 * math.pi)
-FIT = (0.0571085289, 0.491881867, -0.332181442, 0.0714429953)  # of G / pi in powers of 1 - mu (eq. 64)
+FIT = (0.0571085289, 0.491881867, -0.332181442, 0.0714429953)  # coefficients of G / pi in powers of 1 - mu (eq. 64)
 
 FORMS = {
-    "exact": "by the closed form, with an arc cosine",
-    "fit": "by a polynomial in the cosine, accurate to within a thousandth",
+    "exact": "the closed form, which requires an arc cosine",
+    "fit": "a polynomial in the cosine, accurate to within a thousandth",
 }
 
 
 class Eon(BSDF):
-    """Energy-preserving Oren-Nayar: Fujii's single scattering plus compensation of its loss (Portsmouth2025).
+    """Energy-preserving Oren-Nayar: Fujii's single-scattering model with its energy loss compensated (Portsmouth2025).
 
     f = rho / pi A (1 + r s / t) + rho_ms / pi (1 - E(mu_o)) (1 - E(mu_i)) / (1 - E_avg),  mu = cos theta
     s = wo.wi - mu_o mu_i,  t = max(mu_o, mu_i) where s > 0, else 1,  A = 1 / (1 + (1/2 - 2 / (3 pi)) r)
@@ -39,21 +39,22 @@ class Eon(BSDF):
     G = sin theta (theta - sin theta cos theta) + 2/3 (tan theta (1 - sin^3 theta) - sin theta)
     rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the color of light that bounces twice or more
 
-    Unlike `oren-nayar`, it conserves all light at rho = 1 for any roughness and angle, has no dark ring at grazing
-    angles, and becomes more saturated as roughness increases. The model is reciprocal. It is sampled by a clipped
-    linearly transformed cosine, mixed with uniform directions (sec. 4 of the paper).
+    Unlike `oren-nayar`, the model conserves all light at rho = 1 for any roughness and angle, has no dark ring at
+    grazing angles, and becomes more saturated as roughness increases. It is reciprocal and is sampled by a mixture of a
+    clipped linearly transformed cosine and uniform directions (sec. 4 of the paper).
     """
 
     albedo: Colour = spectrum(default=0.5, doc="rho, the fraction of light reflected per bounce", low=0.0, high=1.0)
-    roughness: Number = number(default=0.5, doc="r: 0 is Lambert, 1 the roughest", low=0.0, high=1.0)
-    energy: str = choice("exact", "how E is computed", FORMS)
+    roughness: Number = number(default=0.5, doc="r: 0 is Lambertian, 1 is roughest", low=0.0, high=1.0)
+    energy: str = choice("exact", "how the albedo E is computed", FORMS)
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"roughness": 0.0}, equals=lambda one: Lambert(one.albedo)),)
     lossless_tolerance: ClassVar[float | None] = 1e-3  # the error of the fit; "exact" has none
 
     @function
     def _lost(self, w: Direction) -> Scalar:
-        """(1 - E(mu)) / (A r) = 1/2 - 2 / (3 pi) - G(mu) / pi, without a difference of albedos; 0 at grazing angles.
+        """(1 - E(mu)) / (A r) = 1/2 - 2 / (3 pi) - G(mu) / pi, computed without a difference of albedos; 0 at grazing
+        angles.
 
         G = sin (theta - sin cos) + 2/3 (tan (1 - sin^3) - sin), where (1 - sin^3) / cos is computed with
         1 - sin = cos^2 / (1 + sin).
@@ -119,7 +120,7 @@ class Eon(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """rho E + rho_ms (1 - E), from above; None for the fit, which is approximate."""
+        """rho E + rho_ms (1 - E) for wo above the surface; None for the fit, which is approximate."""
         if self.energy != "exact":
             return None
         r, rho = float(self.roughness), np.asarray(self.albedo, float)  # type: ignore[arg-type]
@@ -143,10 +144,11 @@ def _uniform_share(mu: Scalar, r: Scalar) -> Scalar:
 
 @function
 def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """Fitted values a, b, c, d of the matrix M = ((a, 0, b), (0, c, 0), (d, 0, 1)), which maps a cosine to the lobe.
+    """The fitted entries a, b, c, d of the matrix M = ((a, 0, b), (0, c, 0), (d, 0, 1)), which maps a cosine to the
+    lobe.
 
-    The published fit is in powers of mu. Near the normal, b and d are then differences of nearly equal numbers, so here
-    they are in powers of 1 - mu.
+    In the published fit, in powers of mu, b and d are differences of nearly equal numbers near the normal. Here, they
+    are expressed in powers of 1 - mu.
     """
     mu = wo.z
     low = sin2(wo) / (1.0 + ops.abs(mu))  # 1 - mu

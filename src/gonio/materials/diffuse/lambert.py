@@ -13,9 +13,9 @@ from ...ops import Direction, Mode, Scalar, Spectrum, abs, inv_pi, where
 
 
 class Lambert(BSDF):
-    """Ideal diffuse reflection: f = albedo / pi, the same in every direction (course notes, part B).
+    """Ideal diffuse reflection: f = albedo / pi in every direction (course notes, part B).
 
-    The model is reciprocal, and conserves energy for albedo <= 1. Directions are sampled with a density proportional to
+    The model is reciprocal and conserves energy if albedo <= 1. Directions are sampled with a density proportional to
     the cosine.
     """
 

@@ -16,16 +16,17 @@ from .lambert import Lambert
 
 
 class OrenNayar(BSDF):
-    """Diffuse reflection of a surface of Lambertian V-grooves, in the qualitative form (OrenNayar1994, sec. 4.4).
+    """Diffuse reflection by Lambertian V-grooves: the qualitative form of the model (OrenNayar1994, sec. 4.4).
 
-    f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)),  a = max(theta_o, theta_i), b = min(the same)
+    f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b))
+    a = max(theta_o, theta_i),  b = min(theta_o, theta_i)
     A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eq. 2 and 3)
 
-    No trigonometric function is evaluated: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and
-    the product of the two sines and the cosine of the azimuth is the dot product of the tangential components. The
-    model is valid for small sigma only (up to about 0.5 rad); beyond this range, the formula is used unchanged. It
-    omits interreflections, so it loses more energy as sigma grows. At grazing angles, the directional albedo tends to
-    albedo (A + B / 2), which exceeds 1 for albedo = 1 and sigma < 0.33.
+    No trigonometric functions are evaluated: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i),
+    and the product of the two sines and the cosine of the azimuth difference is the dot product of the tangential
+    components. The model is valid only for small sigma (up to about 0.5 rad); beyond this range, the formula is used
+    unchanged. Interreflections are omitted, so the energy loss increases with sigma. At grazing angles, the directional
+    albedo tends to albedo (A + B / 2), which exceeds 1 for albedo = 1 and sigma < 0.33.
     """
 
     albedo: Colour = spectrum(
@@ -36,9 +37,9 @@ class OrenNayar(BSDF):
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"sigma": 0.0}, equals=lambda one: Lambert(one.albedo)),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "at grazing angles, the albedo A + B / 2 of the qualitative form is up to 1.015 (sigma = 0.2, albedo = 1)",
+            "at grazing angles, the albedo A + B / 2 of the qualitative model is up to 1.015 (sigma = 0.2, albedo = 1)",
             lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
-            certain=False,  # below sigma = 0.04 the violation is under a thousandth
+            certain=False,  # below sigma = 0.04, the violation is less than a thousandth
         )
     }
 
@@ -60,7 +61,7 @@ class OrenNayar(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """cos theta_i / pi above the surface, since the term with B is small and equally smooth."""
+        """cos theta_i / pi above the surface; the term with B is small and equally smooth."""
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
     @method
@@ -72,7 +73,7 @@ class OrenNayar(BSDF):
 def _grazing_albedo(sigma: float) -> float:
     """A + B / 2, the limit of the albedo as theta_o goes to 90 degrees.
 
-    There sin(a) tan(b) = tan theta_i, and (1 / pi) int max(0, cos phi) tan theta cos theta sin theta dtheta dphi = 1/2.
+    Then sin(a) tan(b) = tan theta_i, and (1 / pi) int max(0, cos phi) tan theta cos theta sin theta dtheta dphi = 1/2.
     """
     s2 = sigma * sigma
     return 1.0 - 0.5 * s2 / (s2 + 0.33) + 0.225 * s2 / (s2 + 0.09)

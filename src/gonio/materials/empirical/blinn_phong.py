@@ -16,10 +16,11 @@ from .phong import _Empirical
 
 
 class BlinnPhong(_Empirical):
-    """Phong's model with the highlight (n.h)^p, h the half vector (Blinn1977): kd cos theta_i + ks max(0, n.h)^p.
+    """Blinn's variant of Phong's model: eval = kd cos theta_i + ks max(0, n.h)^p (Blinn1977).
 
-    n.h is never negative for light and viewer above the surface, so the highlight has no cut-off edge. A highlight as
-    wide as Phong's needs about four times the exponent. The model is neither reciprocal nor energy-conserving.
+    h is the half vector. For light and viewer above the surface, n.h is never negative, so the highlight is never cut
+    off. To match the width of Phong's highlight, the exponent must be about four times as large. The model is neither
+    reciprocal nor energy-conserving.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
@@ -29,7 +30,8 @@ class BlinnPhong(_Empirical):
     }
 
     def _highlight_power(self) -> np.ndarray:
-        """An upper bound: the smaller of int cos^p 4 (v.h) dh <= 8 pi / (p + 1) and 2 pi, that of the hemisphere."""
+        """An upper bound: the smaller of int cos^p 4 (v.h) dh <= 8 pi / (p + 1) and the solid angle 2 pi of the
+        hemisphere."""
         return np.minimum(8.0 * np.pi / (np.asarray(self.p) + 1.0), 2.0 * np.pi)
 
     @function

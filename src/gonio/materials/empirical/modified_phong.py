@@ -23,7 +23,7 @@ class ModifiedPhong(BSDF):
 
     v is wo, and r is wi mirrored about the normal; v.r is clamped to 0 (Lafortune1994). Because of the normalization
     factor, ks is the albedo of the lobe at normal incidence; toward grazing angles, part of the lobe lies below the
-    surface and is lost. Energy is conserved for kd + ks <= 1. `phong` is Phong's original model, and `lafortune`
+    surface and is lost. Energy is conserved if kd + ks <= 1. `phong` is Phong's original model, and `lafortune`
     generalizes this one.
     """
 
@@ -45,8 +45,8 @@ class ModifiedPhong(BSDF):
         """Probability of sampling the lobe: ks / (ks + kd), where ks is reduced if the lobe is wide or partly below
         the horizon.
 
-        With r = (p + 1) / 2 the peak density of the lobe divided by that of the cosine, a wide lobe is reduced by the
-        factor ((r - 1/2) / (r + 1/2))^2.
+        Let r = (p + 1) / 2 be the peak density of the lobe divided by that of the cosine. For a wide lobe, ks is
+        multiplied by ((r - 1/2) / (r + 1/2))^2.
         """
         lobe = mean(self.ks) * sqr(self.p / (self.p + 2.0)) * clamp(wo.z, 0.1, 1.0)
         return clamp(ops.safe_div(lobe, lobe + mean(self.kd)), 0.0, MAX_LOBE_SHARE)
@@ -76,7 +76,7 @@ class ModifiedPhong(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def lossless(self) -> Self:
-        """The material itself, since no kd and ks with kd + ks = 1 reflect all light."""
+        """The material itself, because no kd and ks with kd + ks = 1 reflect all light."""
         return self
 
     def tint(self, wo: Direction) -> Spectrum:
@@ -84,4 +84,4 @@ class ModifiedPhong(BSDF):
         return self.kd + self.ks
 
 
-MAX_LOBE_SHARE = 0.95  # largest probability of the lobe: cosine samples keep the weights bounded
+MAX_LOBE_SHARE = 0.95  # maximum probability of the lobe; cosine samples keep the weights bounded

@@ -21,24 +21,24 @@ from ...optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, sq
 class _Empirical(BSDF):
     """Base of Phong's and Blinn's models: ambient, diffuse and specular terms, as published (Phong1975).
 
-    `eval` is kd (n.l) + ks (highlight)^p, without the factor 1/pi, a normalization, or a cosine in the specular term,
-    so f = eval / cos theta_i is unbounded at grazing incidence.
+    `eval` is kd (n.l) + ks (highlight)^p, without the factor 1/pi, a normalization factor, or a cosine in the specular
+    term; f = eval / cos theta_i is therefore unbounded at grazing incidence.
     """
 
     kd: Colour = spectrum(default=0.5, doc="diffuse coefficient", low=0.0)
     ks: Colour = spectrum(default=0.3, doc="specular coefficient", low=0.0)
     p: Number = number(default=32.0, doc="exponent of the highlight", low=0.0)
-    ka: Colour = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
-    check_sum: bool = flag(default=False, doc="require ka + kd + ks = 1")
+    ka: Colour = spectrum(default=0.0, doc="ambient coefficient, which multiplies the scene's ambient light", low=0.0)
+    check_sum: bool = flag(default=False, doc="whether ka + kd + ks = 1 is required")
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"ks": 0.0}, mutes=("p", "ka")), Limit({"kd": 0.0}, mutes=("ka",)))
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the specular term has no factor cos theta_i, so f contains it divided by cos theta_i",
+            "the specular term lacks the factor cos theta_i, so f contains it divided by cos theta_i",
             lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
         ),
         "energy": KnownViolation(
-            "neither term is normalized: kd = 1 reflects pi times the light that it receives",
+            "neither term is normalized: a diffuse term with kd = 1 reflects pi times the incident light",
             lambda model: np.max(np.pi * np.asarray(model.kd) + np.asarray(model.ks) * model._highlight_power()) - 1.0,
         ),
     }
@@ -118,12 +118,12 @@ class _Empirical(BSDF):
 
 
 class Phong(_Empirical):
-    """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p, r = l mirrored about n (course sheet, eq. 1; Phong1975).
+    """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p (course sheet, eq. 1; Phong1975).
 
-    Ia and I are the ambient and the direct light, n is the normal, l = wi and v = wo. eval(wo, wi) =
-    kd cos theta_i + ks max(0, v.r)^p; the renderer applies the falloff of the light with distance. v.r is clamped to
+    Ia and I are the ambient and the direct light, n is the normal, l = wi, v = wo, and r is l mirrored about n. `eval`
+    is kd cos theta_i + ks max(0, v.r)^p; the renderer applies the falloff of the light with distance. v.r is clamped to
     0, because an even p would otherwise cause a second highlight on the opposite side. Light from below the surface
-    contributes nothing. The model is neither reciprocal nor energy-conserving.
+    does not contribute. The model is neither reciprocal nor energy-conserving.
     """
 
     def _highlight_power(self) -> np.ndarray:

@@ -19,34 +19,37 @@ from .glossy import _Glossy, facet, sum_breach
 
 
 class AshikhminShirley(_Glossy):
-    """Anisotropic Phong: f = diffuse term + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
+    """An anisotropic Phong model: f = diffuse term + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
 
-    p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)), normalized over half vectors h.
-    The exponents n_x and n_y are given by `exponent`. F is Schlick's approximation, as in the paper, with
-    F0 = ((eta - 1) / (eta + 1))^2. The diffuse term is Lambertian or, if `coupled`, that of the paper, which excludes
-    the light that F0 reflects and decreases toward grazing angles. The model is reciprocal.
+    p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)) is the density of h.
+    h is the half vector. The exponents n_x and n_y are given by `exponent`. By default, F is Schlick's approximation
+    with F0 = ((eta - 1) / (eta + 1))^2, as in the paper. The diffuse term is Lambertian or, if `coupled` is true, that
+    of the paper, which excludes the fraction F0 of the light and decreases toward grazing angles. The model is
+    reciprocal.
 
-    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
     """
 
     specular: Colour = spectrum(default=1.0, doc="scale factor of the lobe", low=0.0)
-    exponent: Width = width(default=100.0, doc="exponent of the lobe; two for anisotropy", low=0.0, high=math.inf)
+    exponent: Width = width(
+        default=100.0, doc="exponent of the lobe; for anisotropy, a pair along x and y", low=0.0, high=math.inf
+    )
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: str = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
     coupled: bool = flag(
-        default=False, doc="whether the diffuse term is that of the paper, which excludes the light that F0 reflects"
+        default=False, doc="whether the diffuse term is that of the paper, which excludes the fraction F0 of the light"
     )
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"specular": 0.0}, mutes=("exponent", "rotation", "eta")),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
     def _most(self) -> np.ndarray:
-        """The bound `specular`, since the weight of a sample is specular F (n.i) / max((n.o), (n.i))."""
+        """`specular`, because the weight of a sample is specular F (n.i) / max((n.o), (n.i))."""
         return np.max(np.asarray(self.specular, float))
 
     def reflectance(self, cos_theta: Scalar | float) -> Spectrum:
-        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` selects."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
@@ -59,8 +62,8 @@ class AshikhminShirley(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(n / (n + 9))^2, which is 0 for the flat lobe n = 0, since the peak density of the lobe is (n + 1) / 8 times
-        that of the cosine."""
+        """(n / (n + 9))^2, which is 0 for n = 0, where the lobe is flat. The peak density of the lobe is (n + 1) / 8
+        times that of the cosine."""
         n = sqrt((self.exponent.x + 1.0) * (self.exponent.y + 1.0))
         return sqr((n - 1.0) / (n + 8.0))
 
@@ -106,8 +109,8 @@ def _faded(cos: Scalar) -> Scalar:
 
 @function
 def _half_vector(u1: Scalar, u2: Scalar, exponent: Pair) -> Direction:
-    """A half vector of density p: tan phi = sqrt((n_x + 1) / (n_y + 1)) tan(2 pi u2), then the power lobe of that
-    azimuth (Ashikhmin2000, eq. 9 and 10, all four quadrants at once)."""
+    """A half vector with density p. Its azimuth is given by tan phi = sqrt((n_x + 1) / (n_y + 1)) tan(2 pi u2), and its
+    polar angle follows the power lobe at that azimuth (Ashikhmin2000, eq. 9 and 10, for all four quadrants at once)."""
     s, c = sincos((2.0 * ops.pi) * u2)
     across = s * sqrt((exponent.x + 1.0) / (exponent.y + 1.0))
     over = ops.rsqrt(sqr(c) + sqr(across))

@@ -18,20 +18,23 @@ from .glossy import _Glossy, facet, sum_breach
 
 
 class CookTorrance(_Glossy):
-    """Rough metal or varnish in the original form: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Cook1982).
+    """Cook and Torrance's model as published: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Cook1982).
 
-    As published, D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), with the tangent and cosine of the angle between h and n,
-    is Beckmann's distribution without the factor 1 / pi, and G is that of V-grooves. Today, D includes 1 / pi and the
-    denominator has a 4 in place of pi (`conductor`), so this lobe is four times as bright as a surface with this
-    distribution, and specular = 1/4 corresponds to a real surface. Ngan2005 divides by pi once more. F is computed for
-    a real index eta, without absorption; for a metal of reflectance F0, set eta to (1 + sqrt(F0)) / (1 - sqrt(F0)). The
-    model is reciprocal. It is sampled by the visible normals of Beckmann's distribution with Smith masking.
+    The model describes rough metal or varnish. D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), a function of the angle
+    between h and n, is Beckmann's distribution without the factor 1 / pi, and G is that of V-grooves. In the modern
+    form (`conductor`), D includes the factor 1 / pi, and the denominator contains 4 instead of pi. The lobe is
+    therefore four times as bright as that of a real surface with this distribution; for a real surface, set specular to
+    1/4. Ngan2005 divides by pi once more. F is computed for a real index eta, without absorption; for a metal with
+    reflectance F0, set eta to (1 + sqrt(F0)) / (1 - sqrt(F0)). The model is reciprocal. It is sampled by the visible
+    normals of Beckmann's distribution with Smith masking.
 
-    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
     """
 
     specular: Colour = spectrum(default=0.25, doc="scale factor of the lobe; 1/4 for a real surface", low=0.0)
-    alpha: Width = width(default=0.15, doc="width of the distribution; two for anisotropy", low=1e-3, high=4.0)
+    alpha: Width = width(
+        default=0.15, doc="width of the distribution; for anisotropy, a pair along x and y", low=1e-3, high=4.0
+    )
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: Member = microfacet.fresnel_choice()
@@ -41,11 +44,11 @@ class CookTorrance(_Glossy):
     }
 
     def _most(self) -> np.ndarray:
-        """4 specular, since the lobe is at most four times the reflection by facets of F = 1."""
+        """4 specular, because the lobe is at most four times the light that facets reflect at F = 1."""
         return 4.0 * np.max(np.asarray(self.specular, float))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` selects."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, zeros_like(self.eta))
 
     @function

@@ -1,4 +1,4 @@
-"""The base of the historic models: the sum of Lambert's reflection and a glossy lobe."""
+"""The base class of the historic models: a Lambertian term plus a glossy lobe."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ...optics.frame import TINY, lit, normal_like
 from ...optics.warp import square_to_cosine_hemisphere
 from ..diffuse.lambert import Lambert
 
-# Maximum probability of sampling the lobe: where the lobe exceeds its sampling density, as at grazing incidence, cosine
+# Maximum probability of sampling the lobe. Where the lobe exceeds its sampling density, as at grazing incidence, cosine
 # samples keep the weights bounded.
 MAX_LOBE_SHARE = 0.95
 
@@ -63,7 +63,8 @@ class _Glossy(BSDF):
         raise NotImplementedError
 
     def _focus(self) -> Scalar | float:
-        """How much narrower the lobe is than the cosine, from 0 to 1; a wide lobe is sampled better by the cosine."""
+        """How narrow the lobe is compared with the cosine, from 0 to 1; the cosine is a better density for a wide
+        lobe."""
         return 1.0
 
     def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:
@@ -118,10 +119,10 @@ class _Glossy(BSDF):
 def sum_breach(more: str = "") -> KnownViolation:
     """The violation of energy conservation by a sum of two terms.
 
-    more  a reason due to the lobe alone, which precedes that of the sum
+    more  a reason that concerns the lobe alone, placed before that of the sum
     """
     return KnownViolation(
-        f"{more}the two terms are added, and their sum may exceed 1",
+        f"{more}the diffuse and specular terms are added, and the total albedo may exceed 1",
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
         certain=False,  # the bound need not be reached
     )
@@ -129,7 +130,8 @@ def sum_breach(more: str = "") -> KnownViolation:
 
 @function
 def facet(wo: Direction, wi: Direction) -> tuple[Direction, Scalar]:
-    """The half vector h, and o.h, computed as half the length of o + i, which rounding never makes 0 or negative."""
+    """The half vector h and the cosine o.h, which is half the length of o + i, so that rounding cannot make it 0 or
+    negative."""
     total = wo + wi
     size = sqrt(maximum(dot(total, total), TINY))
     return total * (1.0 / size), 0.5 * size

@@ -1,4 +1,4 @@
-"""He, Torrance, Sillion and Greenberg's model."""
+"""The model of He, Torrance, Sillion and Greenberg."""
 
 from __future__ import annotations
 
@@ -34,29 +34,31 @@ from ...optics.special import exprel
 from ..microfacet import microfacet
 from .glossy import _Glossy, facet, sum_breach
 
-TERMS = 64  # of the series; the largest term is that of m = g, so these suffice up to g = 40
-ROUGH = 18.0  # if all channels have a larger g, the limit of the series is used, blended over 1 (Westin's program)
+TERMS = 64  # number of terms of the series; the term with m = g is the largest, so these suffice up to g = 40
+ROUGH = 18.0  # if all g are larger, the limit of the series is used, blended over an interval of 1 (Westin's program)
 
 
 class HeTorrance(_Glossy):
-    """Wave optics of a Gaussian rough surface, the directional-diffuse term: f = diffuse / pi + specular F S G D / (pi
-    (n.o)(n.i)) (He1991, eq. 71, 76 and 78).
+    """The directional-diffuse term of a wave-optics model of Gaussian rough surfaces (He1991, eq. 71, 76 and 78).
+
+    f = diffuse / pi + specular F S G D / (pi (n.o)(n.i))
 
     D = (pi tau / 2 lambda)^2 sum_m g^m e^-g / (m m!) exp(-(pi tau v / lambda)^2 / m), where lambda is the wavelength, v
     is the length of the tangential component of o + i, and g = (2 pi s / lambda (n.o + n.i))^2. The roughness of the
     unshadowed part of the surface is s = sigma / sqrt(1 + w), where w e^w = x^2 and x is the sum of
-    tan theta erfc(cot theta / width) / sqrt(8 pi) over the two directions, with width = 2 sigma / tau. G, the factor of
-    the polarization vectors, is 4 (o.h)^2 / (n.h)^2 for any pair: the vectors of eq. 76 are orthonormal, and the other
-    factors cancel. S is Smith masking for Beckmann slopes of this width, times (1 + erf(cot theta / width)) / 2 for
-    each direction, with the exponential that is missing from the printed eq. 25 (Holzschuch2017).
+    tan theta erfc(cot theta / width) / sqrt(8 pi) over the two directions, with width = 2 sigma / tau. G, the factor
+    due to the polarization vectors, is 4 (o.h)^2 / (n.h)^2 for any pair of directions, because the vectors of eq. 76
+    are orthonormal and the other factors cancel. S is Smith masking for Beckmann slopes of this width, multiplied for
+    each direction by (1 + erf(cot theta / width)) / 2; it includes the exponential that is missing from eq. 25 as
+    printed (Holzschuch2017).
 
     As in Ngan2005, F is computed for a real index and unpolarized light, and the coherent (mirror) term is omitted,
-    since measured tables do not contain it. Above g = 18, D is the limit of the series,
-    exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2), with h the angle between the half vector and n. The model
-    is reciprocal. Lengths are in nm; only their ratios matter. The model is sampled by the visible normals of GGX, with
-    the width of the lobe at its peak.
+    because measured tables do not contain it. If g exceeds 18, D is the limit of the series,
+    exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2), where h is the angle between the half vector and n. The
+    model is reciprocal. Lengths are in nm, but only their ratios matter. The model is sampled by the visible normals of
+    GGX with the width of the lobe at its peak.
 
-    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
     """
 
     specular: Colour = spectrum(default=1.0, doc="scale factor of the lobe", low=0.0)
@@ -67,21 +69,22 @@ class HeTorrance(_Glossy):
     fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": sum_breach("toward grazing angles G D grows faster than S falls, "),
+        "energy": sum_breach("toward grazing angles, G D grows faster than S falls, "),
     }
 
     def reflectance(self, cos_theta: Scalar) -> Scalar:
-        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` selects."""
         return fresnel.kind(self.fresnel).dielectric(cos_theta, fresnel.cos_transmitted(cos_theta, self.eta), self.eta)
 
     @function
     def _width(self) -> Scalar:
-        """The width of the distribution of slopes, as Beckmann's alpha."""
+        """The width of the slope distribution, equivalent to Beckmann's alpha."""
         return 2.0 * self.sigma / self.tau
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^2, with r = 1 / (4 width^2) the peak density of a rough surface divided by the cosine's."""
+        """(r / (1 + r))^2, where r = 1 / (4 width^2) is the peak density of the rough lobe divided by that of the
+        cosine."""
         return 1.0 / sqr(1.0 + 4.0 * sqr(self._width()))
 
     @function
@@ -99,7 +102,7 @@ class HeTorrance(_Glossy):
     @function
     def _roughness2(self, x: Scalar) -> Scalar:
         """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eq. 80 to 82). An estimate of w within a few percent is
-        refined by Newton steps for w = x^2 e^-w to rounding errors."""
+        refined to rounding error by Newton steps for w = x^2 e^-w."""
         x2 = sqr(x)
         log_x = log(1.0 + x2)
         w = log_x * (1.0 - log(1.0 + log_x) / (2.0 + log_x))
@@ -110,10 +113,11 @@ class HeTorrance(_Glossy):
 
     @function
     def _series(self, g: Spectrum, spread: Spectrum) -> Spectrum:
-        """sum_m g^m e^-g / (m m!) exp(-spread / m), and its limit exp(-spread / g) / g where all g are large."""
+        """sum_m g^m e^-g / (m m!) exp(-spread / m), and its limit exp(-spread / g) / g if g is large in all
+        channels."""
         limit = exp(-spread / maximum(g, 1.0)) / maximum(g, 1.0)
         blend = clamp(-max_component(-g) - ROUGH, 0.0, 1.0)
-        g = minimum(g, 60.0)  # above, only the limit is used, and the powers would overflow float32
+        g = minimum(g, 60.0)  # above 60, only the limit is used; the powers would overflow float32
         term = g * exp(-g)
         total = term * exp(-spread)
         for m in range(2, TERMS + 1):

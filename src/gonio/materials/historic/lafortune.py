@@ -20,21 +20,21 @@ SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which the lobe 
 
 
 class Lafortune(_Glossy):
-    """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
+    """A generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
 
-    The three factors C are cx, cy and cz, n is `exponent`, and negative bases of the power are clamped to 0
-    (Lafortune1997, eq. 4). C = (-1, -1, 1) gives Phong's lobe about the mirror direction, normalized (Lafortune1994),
-    which Ngan2005 calls Blinn-Phong. A cz below 1 tilts the lobe toward the horizon, and positive cx and cy cause
-    retro-reflection. The largest |C| should be 1, as in the normalization of Ngan2005, since the lobe scales with its
+    The three coefficients C are cx, cy and cz, n is `exponent`, and a negative base of the power is clamped to 0
+    (Lafortune1997, eq. 4). C = (-1, -1, 1) gives the normalized Phong lobe about the mirror direction (Lafortune1994),
+    which Ngan2005 calls Blinn-Phong. If cz is below 1, the lobe is tilted toward the horizon; positive cx and cy cause
+    retro-reflection. The largest |C| should be 1, as in the normalization of Ngan2005, because the lobe scales with its
     n-th power. The model is reciprocal. It is sampled by a power lobe about (cx o_x, cy o_y, cz o_z).
 
-    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
     """
 
     specular: Colour = spectrum(default=0.2, doc="albedo of the lobe for C = (-1, -1, 1), at normal incidence", low=0.0)
-    cx: Number = number(default=-1.0, doc="factor of o_x i_x; negative for mirror reflection", low=-1.0, high=1.0)
-    cy: Number = number(default=-1.0, doc="factor of o_y i_y; negative for mirror reflection", low=-1.0, high=1.0)
-    cz: Number = number(default=1.0, doc="factor of o_z i_z", low=-1.0, high=1.0)
+    cx: Number = number(default=-1.0, doc="coefficient of o_x i_x; negative for mirror reflection", low=-1.0, high=1.0)
+    cy: Number = number(default=-1.0, doc="coefficient of o_y i_y; negative for mirror reflection", low=-1.0, high=1.0)
+    cz: Number = number(default=1.0, doc="coefficient of o_z i_z", low=-1.0, high=1.0)
     exponent: Number = number(default=50.0, doc="exponent of the lobe", low=0.0)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
@@ -54,7 +54,7 @@ class Lafortune(_Glossy):
     @function
     def _axis(self, wo: Direction) -> tuple[Direction, Scalar]:
         """The unit axis of the lobe, and the n-th power of its length before normalization. The power is computed from
-        1 - length^2, since for a large n a rounded length close to 1 is too inaccurate."""
+        1 - length^2, because a rounded length close to 1 is too inaccurate for a large n."""
         axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
         missing = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
         missing = minimum(missing, 1.0 - SHORTEST)
@@ -63,7 +63,8 @@ class Lafortune(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """((r - 1/2) / (r + 1/2))^2, with r = (n + 1) / 2 the peak density of the lobe divided by the cosine's."""
+        """((r - 1/2) / (r + 1/2))^2, where r = (n + 1) / 2 is the peak density of the lobe divided by that of the
+        cosine."""
         return sqr(self.exponent / (self.exponent + 2.0))
 
     @function
@@ -81,13 +82,13 @@ class Lafortune(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A direction of the power lobe about the axis."""
+        """A direction sampled from the power lobe about the axis."""
         axis, _ = self._axis(wo)
         return to_frame(axis, square_to_power_lobe(u.y, u.z, self.exponent))
 
     @function
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular |C o|^n times the cosine of the axis: the albedo of a narrow lobe."""
+        """specular |C o|^n times the cosine between axis and normal: the albedo of a narrow lobe."""
         axis, strength = self._axis(wo)
         return self.specular * (strength * ops.clamp(axis.z, 0.1, 1.0))
 

@@ -19,36 +19,36 @@ from .glossy import _Glossy, facet, sum_breach
 
 
 class LowMicrofacet(_Glossy):
-    """Microfacets with a power-law distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
+    """A microfacet model with a power-law D: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
 
     D = (1 + b (1 - n.h))^-c is not normalized, so `specular` includes the height of the peak of D. G is that of
     V-grooves, and the factor 1 / pi is that of Cook1982. The model is reciprocal. It is sampled by the power law of D.
 
-    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
     """
 
-    specular: Colour = spectrum(default=3.0, doc="scale factor of the lobe: the height of D", low=0.0)
-    b: Number = number(default=300.0, doc="narrowness of the peak, which ends at 1 - n.h = 1 / b", low=1e-3)
-    c: Number = number(default=1.5, doc="falloff beyond the peak, as (1 - n.h)^-c", low=0.0)
+    specular: Colour = spectrum(default=3.0, doc="scale factor of the lobe, including the height of D", low=0.0)
+    b: Number = number(default=300.0, doc="narrowness of the peak, which extends to 1 - n.h = 1 / b", low=1e-3)
+    c: Number = number(default=1.5, doc="exponent of the falloff beyond the peak, (1 - n.h)^-c", low=0.0)
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("D is not normalized, ")}
 
     def _most(self) -> np.ndarray:
-        """The bound 16 specular m, with m = int D d(n.h): the weight of a sample is 8 specular m F G (o.h) / (n.o), and
+        """16 specular m, where m = int D d(n.h): the weight of a sample is 8 specular m F G (o.h) / (n.o), and
         G (o.h) <= 2 (n.o)."""
         b, c = np.asarray(self.b, float), np.asarray(self.c, float)
         log_t, q = np.log1p(b), np.where(np.abs(1.0 - c) < 1e-9, 1e-9, 1.0 - c)
         return np.max(np.asarray(self.specular, float)) * 16.0 * np.max(np.expm1(q * log_t) / (q * b))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` selects."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
     def _fall(self, h: Direction) -> Scalar:
-        """(1 + b (1 - n.h))^-c, with 1 - n.h computed from the sine, since the difference cancels at the peak."""
+        """(1 + b (1 - n.h))^-c, with 1 - n.h computed from the sine, because the difference cancels at the peak."""
         return exp(-self.c * log(1.0 + self.b * frame.sin2(h) / (1.0 + h.z)))
 
     @function
@@ -58,12 +58,12 @@ class LowMicrofacet(_Glossy):
 
     @function
     def _log_end(self) -> Scalar:
-        """log(1 + b), where the power law ends."""
+        """log(1 + b), at which the power law ends."""
         return self.b * logrel(self.b)
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^3, with r = 1 / (8 int D) the peak density of the lobe divided by the cosine's."""
+        """(r / (1 + r))^3, where r = 1 / (8 int D) is the peak density of the lobe divided by that of the cosine."""
         narrower = 1.0 / (1.0 + 8.0 * self._mass())
         return narrower * sqr(narrower)
 

@@ -38,18 +38,18 @@ RIM = 0.25
 class LowSmooth(_Glossy):
     """Rayleigh-Rice scattering of a nearly smooth surface: f = diffuse / pi + specular (1 + b |Dp|^2)^-c F (Low2012).
 
-    Dp, the tangential component of o + i, measures how far the pair deviates from mirror reflection; the lobe follows
-    the power spectrum of polished surfaces (Church1990; the ABC model). F is evaluated at cos = sqrt(1 - |q|^2 / 4),
-    where q is the tangential component of o - i; for a mirrored pair, this is the cosine of incidence. The model is
-    reciprocal. `specular` is not an albedo but the height of the peak divided by F, in 1/sr. The model is sampled by
-    the lobe's power law, truncated near the rim of the disk of projected directions.
+    Dp, the tangential component of o + i, is the deviation of the pair from mirror reflection. The lobe follows the
+    power spectrum of polished surfaces (the ABC model; Church1990). F is evaluated at the cosine sqrt(1 - |q|^2 / 4),
+    where q is the tangential component of o - i; for mirror reflection, this is the cosine of the angle of incidence.
+    The model is reciprocal. `specular` is not an albedo but the height of the peak divided by F, in 1/sr. The model is
+    sampled by the power law of the lobe, truncated near the rim of the disk of projected directions.
 
-    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
     """
 
     specular: Colour = spectrum(default=10.0, doc="height of the peak divided by F, in 1/sr", low=0.0)
-    b: Number = number(default=300.0, doc="narrowness of the peak, which ends at |Dp| = 1 / sqrt(b)", low=1e-3)
-    c: Number = number(default=1.0, doc="falloff beyond the peak, as |Dp|^(-2 c)", low=0.0)
+    b: Number = number(default=300.0, doc="narrowness of the peak, whose radius in Dp is 1 / sqrt(b)", low=1e-3)
+    c: Number = number(default=1.0, doc="falloff beyond the peak, as the length of Dp to the power -2 c", low=0.0)
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: Member = microfacet.fresnel_choice()
 
@@ -60,7 +60,7 @@ class LowSmooth(_Glossy):
         return np.max(np.asarray(self.specular, float)) * np.max(_area(np.asarray(self.b), np.asarray(self.c), 2.0))
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
+        """F at the cosine of incidence on a facet, by the formula that `fresnel` selects."""
         return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
@@ -83,7 +83,7 @@ class LowSmooth(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(1 - 1 / r)^2, with r = 1 / (2 mass) the peak density of the lobe divided by that of the cosine, which is
+        """(1 - 1 / r)^2, where r = 1 / (2 mass) is the peak density of the lobe divided by that of the cosine, which is
         uniform on the disk."""
         mass = self._mass(ops.ones_like(self.b))
         return sqr(ops.clamp(1.0 - 2.0 * mass, 0.0, 1.0))
@@ -99,22 +99,22 @@ class LowSmooth(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """The direction whose projection is a step away from that of the mirrored wo, in a uniform azimuth. The length
-        of the step follows the power law, truncated at the rim of the disk or at `RIM`, whichever is farther; a step
-        beyond the rim is a failed sample."""
+        """The direction whose projection is one step away from that of the mirrored wo, at a uniform azimuth. The
+        length of the step follows the power law, truncated at the rim of the disk or at `RIM`, whichever is farther; a
+        step beyond the rim is a failed sample."""
         s, c = sincos((2.0 * ops.pi) * u.z)
         rim = _rim(wo, c, s)
         q = 1.0 - self.c
         end = maximum(rim.ahead, RIM)
         log_t = power_quantile(u.y * power_integral(self._log_fall(sqr(end)), q), q)
         r = sqrt(log_t * exprel(log_t) / self.b)
-        # 1 - x^2 - y^2 as a product, since the difference cancels near the rim
+        # 1 - x^2 - y^2 as a product, because the difference cancels near the rim
         z2 = (rim.ahead - r) * (rim.behind + r)
         beyond = ops.rsqrt(1.0 + maximum(-z2, 0.0))
         return vec3((r * c - wo.x) * beyond, (r * s - wo.y) * beyond, safe_sqrt(z2))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
-        """specular F times the lobe's integral over a disk of radius 1, which is that over all directions at normal
+        """specular F times the lobe's integral over a disk of radius 1, which contains all directions at normal
         incidence."""
         return self.specular * self.reflectance(wo.z) * ((2.0 * ops.pi) * self._mass(ops.ones_like(wo.z)))
 
@@ -128,8 +128,8 @@ class Rim(NamedTuple):
 def _rim(wo: Direction, c: Scalar, s: Scalar) -> Rim:
     """Distances from the mirrored wo to the rim of the unit disk, along the azimuth (c, s) and opposite to it.
 
-    They are the roots r of |p + r d|^2 = 1, with p the mirrored wo on the disk and d = (c, s). One of them would
-    cancel, so it is computed from their product, -(n.o)^2.
+    They are the roots r of |p + r d|^2 = 1, where p is the mirrored wo on the disk and d = (c, s). One root would
+    suffer from cancellation, so it is computed from their product, -(n.o)^2.
     """
     along = wo.x * c + wo.y * s
     root = sqrt(sqr(along) + sqr(wo.z))

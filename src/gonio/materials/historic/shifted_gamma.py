@@ -37,18 +37,18 @@ MIN_COSINE = -0.01
 
 
 class ShiftedGamma(_Glossy):
-    """Microfacets with a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), per channel
-    (Bagher2012).
+    """A microfacet model with a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) in each
+    channel (Bagher2012).
 
-    D = normalization e^-x / (x^p pi cos^4 h) with x = alpha + tan^2 h / alpha and h the angle of the half vector to n
+    D = normalization e^-x / (x^p pi cos^4 h) with x = alpha + tan^2 h / alpha
     G = G1(o) G1(i) with G1 = 1 + Lambda (1 - exp(t^k)), t = (theta - theta0) / reach; G1 = 1 for theta < theta0
     F = f0 + (1 - f0) (1 - cos)^5 - f1 cos, with cos = o.h
 
-    The angle `reach` replaces the paper's c = reach^-k, which exceeds 1e100 in its fits. D integrates to 1 if
-    normalization = 1 / (alpha Gamma(1 - p, alpha)). All values are fitted: F can exceed 1 and, for f1 > f0, be
-    negative; G1 and the lobe can be negative at the horizon, as published. The model is reciprocal. It is sampled, for
-    the smallest and the largest alpha of the channels, by a power law and an exponential, which together approximate D
-    within a factor of e.
+    h is the angle between the half vector and n. The angle `reach` replaces the parameter c = reach^-k of the paper,
+    which exceeds 1e100 in the published fits. D integrates to 1 if normalization = 1 / (alpha Gamma(1 - p, alpha)).
+    Because all values are fitted, F can exceed 1 and, for f1 > f0, be negative; as published, G1 and the lobe can be
+    negative at the horizon. The model is reciprocal. It is sampled for the smallest and the largest alpha of the
+    channels, by a power law and an exponential that together approximate D to within a factor of e.
 
     The presets are the fits of Bagher2012 to the materials of the MERL database.
     """
@@ -57,7 +57,7 @@ class ShiftedGamma(_Glossy):
     alpha: Colour = spectrum(default=0.05, doc="width of the distribution, as a scale of tan^2 h", low=1e-5)
     p: Colour = spectrum(default=0.5, doc="exponent of x in D, which shapes the peak", low=0.0, high=3.0)
     f0: Colour = spectrum(default=0.05, doc="F at normal incidence, before f1 is subtracted")
-    f1: Colour = spectrum(default=0.0, doc="factor of the cosine that is subtracted from F")
+    f1: Colour = spectrum(default=0.0, doc="coefficient of the cosine that is subtracted from F")
     normalization: Colour = spectrum(default=17.5, doc="scale factor of D (K in the paper)", low=0.0)
     Lambda: Colour = spectrum(default=3.0, doc="strength of the masking", low=0.0)
     reach: Colour = spectrum(default=1.64, doc="angle beyond theta0 at which masking is strong", low=0.05, unit="rad")
@@ -83,7 +83,7 @@ class ShiftedGamma(_Glossy):
         """G1 = 1 + Lambda (1 - exp(t^k)) (Bagher2012, eq. 11)."""
         theta = atan2(sqrt(maximum(frame.sin2(v), 1e-20)), v.z)
         t = maximum(theta - self.theta0, 1e-6) / self.reach
-        power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 is within float32, and far below the lower limit of G1
+        power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 fits in float32, and G1 is far below its lower limit
         depth = self.Lambda * power * exprel(power)
         return maximum(1.0 - depth, MIN_COSINE)
 

@@ -17,16 +17,18 @@ from .glossy import _Glossy, facet, sum_breach
 class Ward(_Glossy):
     """Ward's Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
 
-    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), with the half vector h (Walter2005). The model is
-    reciprocal. The albedo of a narrow lobe is specular cos theta_o, so the lobe loses energy toward grazing angles; a
-    wide lobe, which extends toward the normal, gains energy without bound there. The model is sampled by half vectors
+    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), where h is the half vector (Walter2005). The model is
+    reciprocal. The albedo of a narrow lobe is specular cos theta_o, so energy is lost toward grazing angles; the albedo
+    of a wide lobe, which extends toward the normal, grows without bound there. The model is sampled by half vectors
     with density D (n.h), where D is Beckmann's distribution.
 
-    The presets are published fits to materials of the MERL database, named MATERIAL:PAPER/FIT.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
     """
 
     specular: Colour = spectrum(default=0.2, doc="albedo of the lobe at normal incidence", low=0.0)
-    alpha: Width = width(default=0.15, doc="width of the Gaussian; two for anisotropy", low=1e-3, high=4.0)
+    alpha: Width = width(
+        default=0.15, doc="width of the Gaussian; for anisotropy, a pair along x and y", low=1e-3, high=4.0
+    )
     rotation: Angle = microfacet.rotation_angle()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
@@ -51,7 +53,7 @@ class Ward(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(r / (1 + r))^2, with r = 1 / (4 alpha_x alpha_y) the peak density of the lobe divided by that of the
+        """(r / (1 + r))^2, where r = 1 / (4 alpha_x alpha_y) is the peak density of the lobe divided by that of the
         cosine."""
         return 1.0 / sqr(1.0 + 4.0 * self.alpha.x * self.alpha.y)
 

@@ -11,7 +11,7 @@ from ...optics import frame
 
 Floats: TypeAlias = "NDArray[np.floating]"
 
-HALF = 16  # steps of the directions that leave, and of those that are totally reflected
+HALF = 16  # steps for directions that leave, and for those that are totally reflected
 EPSILON = 1e-9
 
 
@@ -22,9 +22,9 @@ def directions(mu: Floats, lattice: Floats) -> Floats:
 
 
 def places(index: float) -> tuple[Floats, Floats]:
-    """The positions of the nodes, and their cosines inside. Positions from 0 to 1 are the square root of the cosine
-    outside, for light that can leave, whose amount varies fast at grazing angles; those from -1 to 0 are for light that
-    is totally reflected."""
+    """The positions of the nodes, and their cosines inside. For light that can leave, the position is the square root
+    of the cosine outside, from 0 to 1, because the amount of this light varies rapidly at grazing angles; positions
+    from -1 to 0 are for light that is totally reflected."""
     place = np.linspace(-1.0, 1.0, 2 * HALF + 1)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
     mu = np.where(place >= 0.0, np.sqrt(1.0 - (1.0 - place**4) / index**2), critical * (1.0 - place**2))
@@ -32,7 +32,7 @@ def places(index: float) -> tuple[Floats, Floats]:
 
 
 def place_of(cosine: Floats, index: float) -> Floats:
-    """The positions of directions inside, from their cosines."""
+    """The positions that correspond to the cosines of directions inside."""
     outside2 = 1.0 - index**2 * (1.0 - cosine**2)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
     beyond = -np.sqrt(np.maximum(1.0 - cosine / max(critical, EPSILON), 0.0))
@@ -46,7 +46,7 @@ class Spread(NamedTuple):
     weight   weight of each sample, (rows, samples)
     inverse  1 / cosine: the length of a crossing of the coat
     cell     index of the lower of the two nodes in a matrix with a row for each row of samples
-    part     fraction of the weight that the upper one gets
+    part     fraction of the weight that is assigned to the upper node
     """
 
     weight: Floats

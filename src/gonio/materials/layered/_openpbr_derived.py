@@ -19,14 +19,14 @@ from ._openpbr_formulas import averaged, colour_again, covered, over_pi, seen_by
 from ._openpbr_slabs import _OpenPBR
 from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, NODES, PLACES
 
-STEPS = 4  # of the iteration in `balanced`
+STEPS = 4  # number of steps of the iteration in `balanced`
 WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], strict=True)]  # of cosine-weighted means
 
 
 class Other(NamedTuple):
     """Energy lost by glass facets whose reflectance differs from that of bare glass: under a film, or under a coat,
     where reflection depends on the index relative to the coat, and refraction on that relative to the outside. The loss
-    is M + sum_j less_j D_j, where M is the loss of bare glass, D_j is `spared`, and j counts `FEW_PLACES`.
+    is M + sum_j less_j D_j, where M is the loss of bare glass, D_j is `spared`, and j is an index into `FEW_PLACES`.
 
     less         difference of F from that of bare glass, at `FEW_PLACES`
     thin, dense  mean of the loss, from outside and from inside
@@ -50,13 +50,13 @@ class Between(NamedTuple):
     eta          index for the base's refraction, relative to the outside
     medium       index of the medium above the base, relative to the outside
     sheer        fraction of diffuse light that the base's surface transmits: the mean of 1 minus its albedo
-    joint        fraction of such light that the surfaces of base and coat transmit together, divided by `sheer`
+    joint        fraction of diffuse light that the surfaces of base and coat transmit together, divided by `sheer`
     bent         relative deviations from the means of 1 minus the albedo, for the base and for base and coat together,
                  at nodes of the cosine, each times the weight of the node
     filmed       change of F by the film at `PLACES`; empty without a film
     extra        mean of `filmed` over cosines and channels
-    facets       factor on facets under the coat, at nodes of the cosine; empty without a coat
-    returned     mean loss of a dielectric's facets relative to white ones, which the body below receives
+    facets       factor on the lobe of facets under the coat, at nodes of the cosine; empty without a coat
+    returned     mean loss of a dielectric's facets relative to white facets, which the body below receives
     metal        energy lost by single scattering at F = 1
     metal_again  color of a metal's compensation
     sheet_again  colors of a thin sheet's compensation, reflected and transmitted
@@ -223,13 +223,13 @@ def balanced(model: _OpenPBR, rough: Scalar, transmitted: list[Scalar]) -> tuple
     white facets.
 
     It is computed by damped steps of Sinkhorn's iteration. The initial w is that of facets that scatter a fraction b of
-    the light uniformly and mirror the rest, w [(1 - b) w + b q] = 1 - E_coat, with a b that increases toward grazing
-    angles and q the w of most of the light.
+    the light uniformly and mirror the rest, w [(1 - b) w + b q] = 1 - E_coat, where b increases toward grazing angles
+    and q is w at the cosine of most of the light.
 
     transmitted  1 - E_coat at the nodes
     """
     rows, w = tables.scattered_at_nodes(rough, model.masking), []
-    q = sqrt(transmitted[round(0.67 * (HATS - 1))])  # at the cosine at which most of the light is
+    q = sqrt(transmitted[round(0.67 * (HATS - 1))])  # at the cosine of most of the light
     for n, one in enumerate(transmitted):
         cos = (n / (HATS - 1.0)) ** 2
         b = sqr(rough) / (sqr(rough) + cos + 1e-3)

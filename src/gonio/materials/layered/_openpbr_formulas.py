@@ -55,7 +55,7 @@ def total_of(terms: list[Array]) -> Array:
 def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[Scalar, ...]) -> Scalar:
     """<w>, the mean of w over the light that a dielectric's facets scatter to a direction with the given cosine. The
     facets reflect most at grazing angles, so the weights are those of white facets times F of the facet whose normal is
-    half way between the two directions.
+    halfway between the two directions.
 
     row     weights of white facets, from `scattered`
     facets  w at the same nodes of the cosine
@@ -82,8 +82,8 @@ def rough_along(w: Direction, alpha: Pair, index: Scalar) -> Scalar:
 
 
 def covered_less(transmitted: Scalar, less: Scalar, let_in: Spectrum) -> Spectrum:
-    """Transmittance of a coat for light of the body below, which also receives the loss `less` of facets relative to
-    white ones.
+    """Transmittance of a coat for light from the body below, which also receives the light `less` that facets lose
+    relative to white facets.
 
     transmitted  transmittance of the coat's surface
     let_in       transmittance of the base's surface
@@ -126,7 +126,7 @@ def power(colour: Spectrum, exponent: Scalar) -> Spectrum:
 
 
 def direction_at(cos: Scalar) -> Direction:
-    """A direction with a given cosine, half way between the x and y axes."""
+    """A direction with a given cosine, halfway between the x and y axes."""
     sin = math.sqrt(0.5) * safe_sqrt(1.0 - sqr(cos))
     return vec3(sin, sin, cos)
 

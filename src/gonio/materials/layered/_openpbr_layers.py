@@ -39,7 +39,7 @@ from ._openpbr_tables import HATS, NODES
 class Sides(NamedTuple):
     """A pair of directions, both on the upper side.
 
-    wo, wi   the pair, above the surface; the normal in place of a pair that is not evaluated
+    wo, wi   the pair, above the surface; replaced by the normal if the pair is not evaluated
     near     whether wi is on wo's side
     above    whether coat and fuzz are on that side
     """
@@ -71,10 +71,11 @@ def fuzz_lobe(model: _OpenPBR) -> Sheen:
 
 
 def even(model: _OpenPBR, w: Direction, coated: bool) -> Scalar:
-    """Factor on the rough diffuse lobe for a direction, under the base's surface and, if `coated`, also the coat's.
+    """Factor on the rough diffuse lobe for a direction, under the surface of the base and, if `coated`, also of the
+    coat.
 
-    To some cosines, the lobe scatters more light than Lambert's lobe, and the surfaces may transmit less there than on
-    average. The lobe's mean over azimuth is known, and the factor makes a white base lossless to second order.
+    At some cosines, the lobe scatters more light than a Lambertian lobe, and the surfaces may transmit less than on
+    average. The mean of the lobe over azimuth is known, and the factor makes a white base lossless to second order.
     """
     rough = model.base_diffuse_roughness
     lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": ones_like(model.base_color), "roughness": rough})
@@ -103,8 +104,8 @@ def inside(model: _OpenPBR, cos: Scalar) -> Scalar:
 
 @function
 def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
-    """The darkening under the coat, (1 - K) / (1 - E_b K): K is the fraction of the light from below that the coat
-    reflects back down, E_b the albedo of the base in the coat."""
+    """The darkening under the coat, (1 - K) / (1 - E_b K), where K is the fraction of the light from below that the
+    coat reflects back down, and E_b is the albedo of the base inside the coat."""
     b = model.derived
     outer = exact.dielectric(cos, fresnel.cos_transmitted(cos, model.coat_ior), model.coat_ior)
     broad = 1.0 - (1.0 - fresnel.kind("exact").dielectric_average(model.coat_ior)) / sqr(model.coat_ior)
@@ -121,7 +122,7 @@ def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
 def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scalar]:
     """Four values for a direction outside the coat: the transmittance of the coat's surface; the coat's color for one
     crossing times the square root of the darkening; the factor on a lobe of facets; and the loss of a dielectric's
-    facets relative to white ones, which is due to their reflecting most at grazing angles, where the coat transmits
+    facets relative to white facets, which arises because they reflect most at grazing angles, where the coat transmits
     least.
 
     The factor includes a last step of the iteration in `balanced`. For a mirror, it is exactly the square root of

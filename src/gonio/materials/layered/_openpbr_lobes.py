@@ -24,7 +24,7 @@ from ._openpbr_slabs import _OpenPBR
 class Facets(NamedTuple):
     """The facets that mirror one direction into the other.
 
-    cos     cosine between their normal and either direction
+    cos     cosine of the angle between their normal and either direction
     value   their lobe at F = 1
     smooth  rays for which all facets are parallel; None if there are no such rays
     """
@@ -148,7 +148,7 @@ def interface(model: _OpenPBR) -> Dielectric:
 
 
 def sides(model: _OpenPBR, wo: Direction, wi: Direction) -> Sides:
-    """The pair mapped to the upper side. A thin wall is the same from both sides."""
+    """The pair mapped to the upper side. A thin wall looks the same from both sides."""
     near = wo.z * wi.z > 0.0
     above = wo.z > 0.0
     valid = (wo.z != 0.0) & (wi.z != 0.0)

@@ -40,10 +40,10 @@ from ...optics.roughness import SMOOTH
 from ._openpbr_formulas import mix, modulated, power
 
 NARROWEST = 1e-3  # lower limit of the smaller of two widths
-NEAREST = 1.001  # smallest relative index: closer to 1, the facet of a refraction cannot be determined
+NEAREST = 1.001  # smallest relative index; closer to 1, the refracting facet cannot be determined
 LAYERINGS = {
-    "reciprocal": "a layer attenuates the light below along both directions, which is reciprocal",
-    "albedo": "the light below is scaled by one minus the albedo at wo, as in the specification's sum of lobes",
+    "reciprocal": "light from below is attenuated along both directions, which makes the model reciprocal",
+    "albedo": "light from below is multiplied by one minus the layer's albedo for wo, as in the specification",
 }
 
 
@@ -52,7 +52,7 @@ class _OpenPBR(BSDF):
 
     masking: ClassVar[str] = "smith-correlated"
 
-    base_weight: Number = number(default=1.0, doc="factor on `base_color`", low=0.0, high=1.0)
+    base_weight: Number = number(default=1.0, doc="scale factor of `base_color`", low=0.0, high=1.0)
     base_color: Colour = spectrum(
         default=0.8, doc="diffuse color; for metal, the color at normal incidence", low=0.0, high=1.0
     )
@@ -63,36 +63,41 @@ class _OpenPBR(BSDF):
         default=0.0, doc="fraction of the surface that is metal", low=0.0, high=1.0, off=0.0
     )
     specular_weight: Number = number(
-        default=1.0, doc="factor on F0 of the dielectric and on F of metal", low=0.0, high=4.0
+        default=1.0, doc="scale factor of F0 for the dielectric and of F for metal", low=0.0, high=4.0
     )
     specular_color: Colour = spectrum(
-        default=1.0, doc="tint of the outer reflection; for metal, the tint at the edge", low=0.0, high=1.0
+        default=1.0, doc="tint of the reflection from outside; for metal, the tint at the edge", low=0.0, high=1.0
     )
-    specular_roughness: Number = number(default=0.3, doc="square root of alpha", low=0.0, high=1.0)
+    specular_roughness: Number = number(
+        default=0.3, doc="roughness of the base, the square root of alpha", low=0.0, high=1.0
+    )
     specular_roughness_anisotropy: Number = number(
-        default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0
+        default=0.0, doc="anisotropy, from 0 (isotropic) to 1 (stretched along x)", low=0.0, high=1.0, off=0.0
     )
     specular_ior: Number = number(default=1.5, doc="refractive index of the base", low=1.0, high=5.0)
     transmission_weight: Number = number(
         default=0.0, doc="fraction of the dielectric that transmits light", low=0.0, high=1.0, off=0.0
     )
     transmission_color: Colour = spectrum(
-        default=1.0, doc="color of white light after `transmission_depth`; a tint if the depth is 0", low=0.0, high=1.0
+        default=1.0,
+        doc="color of white light after the distance `transmission_depth`; if the distance is 0, a tint of the surface",
+        low=0.0,
+        high=1.0,
     )
     transmission_depth: Number = number(
         default=0.0,
-        doc="distance after which white light has `transmission_color`; 0 tints the surface",
+        doc="distance after which white light has `transmission_color`; if it is 0, the surface is tinted",
         low=0.0,
         high=1e6,
     )
     transmission_scatter: Colour = spectrum(
-        default=0.0, doc="volume scattering; must be 0, since surfaces have none", low=0.0, inside=True
+        default=0.0, doc="volume scattering; must be 0, because it is not a property of a surface", low=0.0, inside=True
     )
     transmission_scatter_anisotropy: Number = number(
         default=0.0, doc="anisotropy of the volume scattering", low=-1.0, high=1.0, inside=True
     )
     transmission_dispersion_scale: Number = number(
-        default=0.0, doc="strength of dispersion; must be 0 (use `dielectric`)", low=0.0, high=1.0, inside=True
+        default=0.0, doc="strength of dispersion; must be 0 (use `dielectric` instead)", low=0.0, high=1.0, inside=True
     )
     transmission_dispersion_abbe_number: Number = number(
         default=20.0, doc="Abbe number of the dispersion", low=0.0, inside=True
@@ -105,33 +110,37 @@ class _OpenPBR(BSDF):
         default=1.0, doc="mean free path; values other than 0 are treated as 0, with a warning", low=0.0, inside=True
     )
     subsurface_radius_scale: Colour = spectrum(
-        default=(1.0, 0.5, 0.25), doc="factor on `subsurface_radius`, per channel", low=0.0, inside=True
+        default=(1.0, 0.5, 0.25), doc="scale factor of `subsurface_radius` for each channel", low=0.0, inside=True
     )
     subsurface_scatter_anisotropy: Number = number(
-        default=0.0, doc="for a thin wall: 1 scatters all light forward, -1 all backward", low=-1.0, high=1.0
+        default=0.0, doc="for a thin wall: 1 scatters all light forward, -1 all light backward", low=-1.0, high=1.0
     )
     coat_weight: Number = number(default=0.0, doc="fraction of the surface under the coat", low=0.0, high=1.0, off=0.0)
     coat_color: Colour = spectrum(
         default=1.0, doc="transmittance of the coat for two crossings at normal incidence", low=0.0, high=1.0
     )
-    coat_roughness: Number = number(default=0.0, doc="square root of alpha", low=0.0, high=1.0)
+    coat_roughness: Number = number(
+        default=0.0, doc="roughness of the coat, the square root of alpha", low=0.0, high=1.0
+    )
     coat_roughness_anisotropy: Number = number(
-        default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0
+        default=0.0, doc="anisotropy, from 0 (isotropic) to 1 (stretched along x)", low=0.0, high=1.0, off=0.0
     )
     coat_ior: Number = number(default=1.6, doc="refractive index of the coat", low=1.0, high=5.0)
     coat_darkening: Number = number(
-        default=1.0, doc="darkening of the base by light reflected under the coat", low=0.0, high=1.0
+        default=1.0, doc="strength of the darkening by interreflection under the coat", low=0.0, high=1.0
     )
     fuzz_weight: Number = number(default=0.0, doc="fraction of the surface under fuzz", low=0.0, high=1.0, off=0.0)
-    fuzz_color: Colour = spectrum(default=1.0, doc="factor on the light scattered by the fuzz", low=0.0, high=1.0)
-    fuzz_roughness: Number = number(default=0.5, doc="0 for fibers along the normal, 1 for dust", low=0.0, high=1.0)
+    fuzz_color: Colour = spectrum(default=1.0, doc="scale factor of the light scattered by the fuzz", low=0.0, high=1.0)
+    fuzz_roughness: Number = number(
+        default=0.5, doc="roughness of the fuzz: 0 for fibers along the normal, 1 for dust", low=0.0, high=1.0
+    )
     thin_film_weight: Number = number(
         default=0.0, doc="fraction of the base under a thin film", low=0.0, high=1.0, off=0.0
     )
     thin_film_thickness: Number = number(default=0.5, doc="thickness of the film", low=0.0, high=3.0, unit="um")
     thin_film_ior: Number = number(default=1.4, doc="refractive index of the film", low=1.0, high=3.0)
     emission_luminance: Number = number(
-        default=0.0, doc="luminance of emission; must be 0 (use an emitter)", low=0.0, unit="nit", inside=True
+        default=0.0, doc="luminance of the emission; must be 0 (use an emitter)", low=0.0, unit="nit", inside=True
     )
     emission_color: Colour = spectrum(default=1.0, doc="color of the emission", low=0.0, inside=True)
     geometry_opacity: Number = number(
@@ -141,7 +150,7 @@ class _OpenPBR(BSDF):
         high=1.0,
         off=1.0,
     )
-    geometry_thin_walled: bool = flag(default=False, doc="whether the surface is a sheet without an interior")
+    geometry_thin_walled: bool = flag(default=False, doc="whether the surface is a thin sheet without an interior")
     layering: str = choice("reciprocal", "how a coat attenuates the layers below", LAYERINGS)
 
     limits: ClassVar[tuple[Limit, ...]] = (
@@ -165,10 +174,10 @@ class _OpenPBR(BSDF):
             raise InputError("emission given, emission_luminance 0 expected", "OpenPBR.emission_luminance", hint)
         bulk = given("transmission_weight") and not self.geometry_thin_walled
         if bulk and given("transmission_scatter") and given("transmission_depth"):
-            hint = "transmission_scatter 0 leaves absorption, which paths follow; or subsurface_weight for a dense body"
+            hint = "set transmission_scatter to 0 to keep only absorption, or use subsurface_weight for a dense body"
             raise InputError("volume scattering is not a property of a surface", "OpenPBR.transmission_scatter", hint)
         if bulk and given("transmission_dispersion_scale"):
-            hint = 'Dielectric(eta="bk7") in a spectral render'
+            hint = 'use Dielectric(eta="bk7") in a spectral render'
             raise InputError("dispersion is not supported", "OpenPBR.transmission_dispersion_scale", hint)
         if given("subsurface_weight") and given("subsurface_radius") and not self.geometry_thin_walled:
             text = (
@@ -178,7 +187,7 @@ class _OpenPBR(BSDF):
 
     def has(self, name: str) -> bool:
         """Whether a weight may differ from 0, as known statically, so that the code of its component is included. A
-        recording includes all components, since their weights are unknown."""
+        recording includes all components, because their weights are unknown."""
         value = getattr(self.plain, name)
         if isinstance(getattr(self, name), Node) or backend.is_drjit(value):
             return True
@@ -211,7 +220,7 @@ class _OpenPBR(BSDF):
         return value * self.geometry_opacity if self.has_holes() else value
 
     def may_be_smooth(self, name: str) -> bool:
-        """Whether a roughness may be so small that its lobe is a mirror's."""
+        """Whether a roughness may be so small that its lobe is a mirror reflection."""
         value = getattr(self.plain, name)
         if isinstance(getattr(self, name), Node) or backend.is_drjit(value):
             return True
@@ -289,7 +298,7 @@ class _OpenPBR(BSDF):
 
     @function
     def clear_film(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
-        """Change of the dielectric's R by the film."""
+        """Change in the dielectric's R due to the film."""
         white = ops.ones_like(self.base_color)
         # the same value for all channels, so that compilers evaluate it once
         alike = ops.of_channels(white, [eta / medium] * len(ops.channels(white)))

@@ -23,12 +23,12 @@ from ...optics.special import gauss
 from ..compensated.kulla_conty import KullaConty
 from ..microfacet.conductor import Conductor
 
-SHARP = math.sqrt(SMOOTH)  # roughness of the tables' first row: below it facets are a mirror
+SHARP = math.sqrt(SMOOTH)  # roughness of the first row of the tables; smoother facets act as a mirror
 MAX_ROOT_F0 = 2.0 / 3.0  # square root of F0 at index 5, where the tables end
-INDICES, ROUGHNESSES, COSINES = 33, 33, 65  # error of F: 2e-3 at grazing angles for any index, else 5e-4
+INDICES, ROUGHNESSES, COSINES = 33, 33, 65  # the error of F is 2e-3 at grazing angles for any index, else 5e-4
 DRAWS = 1 << 12  # samples per direction
-HATS = 12  # nodes of the cosine, at equal steps of its square root: error 0.5 % for a white coated metal, 1 % with 8
-NODES = [float(x) for x in gauss(6)[0]]  # square roots of cosines for means through two layers: error 1e-3 at F0 = 0.05
+HATS = 12  # nodes of the cosine, at equal steps of its root; error for a white coated metal 0.5 %, with 8 nodes 1 %
+NODES = [float(x) for x in gauss(6)[0]]  # roots of cosines, for means through two layers; error 1e-3 at F0 = 0.05
 
 
 def _row(roughness: Scalar) -> Scalar:
@@ -72,7 +72,7 @@ def _albedos(masking: str) -> Table:
 
 
 def reflected_at_nodes(roughness: Scalar, index: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """`reflected` at the cosines of `HATS`, then at those of `NODES`: one lookup instead of eighteen."""
+    """`reflected` at the cosines of `HATS`, then at those of `NODES`, in one lookup instead of eighteen."""
     table = _at_nodes(masking).reflected
     return lookup(table, *[inset(x, n) for x, n in zip((_root_of(index), _row(roughness)), table.shape, strict=True)])
 
@@ -116,7 +116,8 @@ def _at_nodes(masking: str) -> _AtNodes:
 
 
 def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """Fractions of the light that white facets scatter, by all bounces, to the neighborhoods of the `HATS` cosines."""
+    """Fractions of the light that white facets scatter, over all bounces, to the neighborhoods of the `HATS`
+    cosines."""
     table = _scattering(masking)
     at = [inset(x, count) for x, count in zip((_row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return lookup(table, *at)
@@ -145,8 +146,8 @@ def _scattering(masking: str) -> Table:
 
 
 def _hats(x: np.ndarray) -> np.ndarray:
-    """Weights of the nodes for interpolation at positions between them, (N, HATS). They are cubic (Catmull-Rom), since
-    linear interpolation would underestimate the mean of a concave transmittance, and linear beyond the ends."""
+    """Weights of the nodes for interpolation at positions between them, (N, HATS). They are cubic (Catmull-Rom),
+    because linear interpolation would underestimate the mean of a concave transmittance, and linear beyond the ends."""
     d = np.abs(x[:, None] * (HATS - 1) - np.arange(-1, HATS + 1))
     near, far = 1.0 + d * d * (1.5 * d - 2.5), 2.0 + d * (d * (2.5 - 0.5 * d) - 4.0)
     weights: np.ndarray = np.where(d < 1.0, near, np.where(d < 2.0, far, 0.0))
@@ -164,7 +165,7 @@ def means() -> list[float]:
 
 # --------------------------------------------------------------------------- any reflectance
 
-# Gauss nodes for the cosine of facets at which a reflectance is evaluated; between them it is a polynomial
+# Gauss nodes of the cosine at which the reflectance of facets is evaluated; it is interpolated by a polynomial
 PLACES = [float(x) for x in gauss(8)[0]]
 FEW_PLACES = [float(x) for x in gauss(4)[0]]  # for small corrections
 LOSS_INDICES, LOSS_ROUGHNESSES, LOSS_COSINES = 13, 13, 25
@@ -219,7 +220,8 @@ def _faced(masking: str) -> Table:
 
 def spared(cos: Scalar, roughness: Scalar, eta: Scalar, masking: str) -> tuple[Scalar, ...]:
     """The derivative of the energy lost by glass facets with respect to the reflectance at each of `FEW_PLACES`
-    (cosines outside), which is transmitted minus reflected energy: for light from outside, then from inside."""
+    (cosines outside), which is the transmitted minus the reflected energy; first for light from outside, then from
+    inside."""
     table = _spared(masking)[0]
     at = [
         inset(x, count)

@@ -37,58 +37,61 @@ from ..microfacet.dielectric import Dielectric
 from .interior import LayerTables, colour_of, colour_place, left_place, tables_of
 
 BOUNCES = {
-    "coloured": "the base's color applied at each bounce: more saturated and darker than the base alone",
-    "white": "the base's color applied once, as in most renderers: it is the color of the coated material",
+    "coloured": "the base color is applied at each bounce: the result is darker and more saturated than the base alone",
+    "white": "the base color is applied once, as in most renderers, and is the color of the coated material",
 }
 ALMOST_ONE = 0.99999994  # the largest float32 below 1
 
 
 class Coat(BSDF):
-    """A dielectric layer over a base: light is reflected at the top, or refracted, absorbed on its slanted path through
-    the layer, scattered by the base, and reflected between the two until it leaves.
+    """A dielectric layer over a base. Light is reflected at the top surface, or it is refracted, absorbed along its
+    slanted path through the layer, scattered by the base, and reflected between base and top surface until it leaves.
 
     f = f_top + T(o) T(i) t(o') t(i') / eta^2 g f_base(o', i') + rest(o) rest(i) / norm
 
-    f_top is the reflection at the top, with albedo R, and T = 1 - R is the top's transmittance; o' and i' are the
-    directions refracted into the coat, t = exp(-absorption depth / cos) is the transmittance of one crossing along
-    them, and 1 / eta^2, with eta = `index`, is due to the change of solid angle. Light that bounces more than once is
-    represented by the base's own lobe, multiplied by g, and by the separable lobe rest(o) rest(i) / norm (see
-    `interior.py`). This is exact over Lambert; over a metal, the albedo is exact, per channel. Reciprocal; a clear coat
-    on a white base conserves all light.
+    f_top is the BRDF of the top surface, R its albedo, and T = 1 - R its transmittance; o' and i' are the directions
+    refracted into the coat; t = exp(-absorption depth / cos) is the transmittance of one crossing along these
+    directions; and 1 / eta^2, with eta = `index`, accounts for the change of solid angle. Light that bounces more than
+    once is represented by a factor g on the lobe of the base and by the separable lobe rest(o) rest(i) / norm (see
+    `interior.py`). This is exact over a Lambertian base; over a metal, the albedo of each channel is exact. The model
+    is reciprocal, and a clear coat on a white base conserves all light.
 
-    With `bounces="white"`, g and rest are those of a white base: the coated material reflects R plus (1 - R) times
-    the color of the base, which becomes neither darker nor more saturated.
+    With `bounces="white"`, g and rest are those of a white base: the coated material reflects R plus (1 - R) times the
+    color of the base, which therefore becomes neither darker nor more saturated.
 
-    The base is embedded in the coat, so its own index is relative to the coat. A rough top reflects like rough glass,
-    with albedo R; refracted light is not blurred. g and rest are read from tables that are computed on first use. For
-    a top of two widths over a narrow lobe, the albedo may be 2 % too large.
-    Colors of the base may vary over the surface, as may the coat's own absorption and depth, which are axes of the
-    tables; other values must not vary, and derivatives with respect to them omit the change of the tables.
+    The base is embedded in the coat, so its refractive index is relative to that of the coat. A rough top surface
+    reflects like rough glass, with albedo R, but does not blur refracted light. g and rest are read from tables that
+    are computed on first use. If the top surface is anisotropic and the lobe of the base is narrow, the albedo may be 2
+    % too large. The colors of the base and the absorption and depth of the coat may vary over the surface, because they
+    are axes of the tables. All other parameters must be uniform, and derivatives with respect to them omit the change
+    of the tables.
     """
 
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"index": 1.0, "absorption": 0.0}, equals=lambda one: one.base),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "reflection and transmission by a rough top are sampled from rough glass, with this error",
+            "the reflectance and transmittance of a rough top are tabulated from samples, with limited accuracy",
             lambda model: _gain(model),
             certain=False,
         ),
     }
     base: BSDF = bsdf("the material under the coat; it must not transmit")
-    index: Number = number(default=1.5, doc="index of the coat, relative to the outside", low=1.0, high=3.0)
-    alpha: Width = width_parameter(default=0.0, doc="width of the top's microfacets; 0 is smooth")
-    absorption: Colour = spectrum(default=0.0, doc="absorption: exp(-absorption depth) per crossing", low=0.0)
+    index: Number = number(default=1.5, doc="refractive index of the coat, relative to the outside", low=1.0, high=3.0)
+    alpha: Width = width_parameter(default=0.0, doc="width of the microfacets of the top surface; 0 is smooth")
+    absorption: Colour = spectrum(
+        default=0.0, doc="absorption coefficient; a crossing transmits exp(-absorption depth)", low=0.0
+    )
     depth: Number = number(default=1.0, doc="thickness of the coat", low=0.0)
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
-    bounces: str = choice("coloured", "color of light that bounces between coat and base", BOUNCES)
+    bounces: str = choice("coloured", "how light that bounces between coat and base is colored", BOUNCES)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         name = type(self.base).__name__
         if self.base.transmits:
             raise InputError(f"{name} transmits, a material that only reflects expected", "Coat.base")
-        base = tree.plain_values(self.base)  # a width may be a Dr.Jit number, whose value no fact reads
+        base = tree.plain_values(self.base)  # a width may be a Dr.Jit number, which facts do not read
         if base.delta == "maybe" or base.stochastic:
             why = "is a mirror in places" if base.delta == "maybe" else "is random"
             hint = "give it a width everywhere, or make all of it a mirror"
@@ -129,7 +132,8 @@ class Coat(BSDF):
 
     @function
     def _through(self, w: Direction) -> Scalar:
-        """The top's factor on the base's lobe, per direction: T by Fresnel's equations, or from the table if rough."""
+        """The top's factor on the base's lobe for one direction: T by Fresnel's equations, or from the table if it is
+        rough."""
         _, smooth = widths(self.alpha)
         return where(smooth, self._sharp(w), self._at(w)[2])
 
@@ -200,8 +204,9 @@ class Coat(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Pair:
-        """The probability of light from below the top, and, given such light, that of sampling the cosine. The cosine
-        samples the separable lobe, and replaces samples of the base that would fail because of total reflection."""
+        """The probability of sampling light from below the top and, in this case, that of sampling the cosine. The
+        cosine samples the separable lobe and replaces samples of the base that would fail because of total
+        reflection."""
         reflected, even, _, beyond = self._at(wo)
         _, smooth = widths(self.alpha)
         cos = ops.abs(wo.z)
@@ -240,7 +245,7 @@ class Coat(BSDF):
         o = self._inside(wo)
         s_top = self._top.sample(wo, u, mode)
         s_base = self.base.sample(where(wo.z > 0.0, o, -o), ops.vec3(maximum(second, 0.0), u.y, u.z), mode)
-        # out of the coat: tangential components grow by eta
+        # out of the coat: tangential components are multiplied by eta
         x, y = s_base.wi.x * self.index, s_base.wi.y * self.index
         height2 = 1.0 - (sqr(x) + sqr(y))
         leaves = (height2 > 0.0) & (s_base.wi.z > 0.0) & (s_base.pdf > 0.0)
@@ -294,8 +299,8 @@ class Coat(BSDF):
 
 
 def _gain(model: Coat) -> float:
-    """The largest gain in a white furnace: for a top of two widths, measured at 15 random settings with an index from
-    1.1 to 2.5, widths of the top from 0.0015 to 0.5 and of the base below 0.02, plus a third of it."""
+    """The largest gain in a white furnace. For an anisotropic top, it is the gain measured at 15 random settings (index
+    from 1.1 to 2.5, widths of the top from 0.0015 to 0.5, width of the base below 0.02) plus a third of it."""
     if microfacet.delta_of(model.alpha) == "always":
         return 0.0
     return 0.03 if has_two_values(model.alpha) else 0.004

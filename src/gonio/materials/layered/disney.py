@@ -56,40 +56,45 @@ class Pieces(NamedTuple):
 
 
 class Disney(BSDF):
-    """Disney's principled BRDF: eleven parameters, each from 0 to 1 (Burley2012, with its published code).
+    """Disney's principled BRDF, with eleven parameters from 0 to 1 (Burley2012 and the code published with it).
 
     f = (1 - metallic) (base / pi mix(f_d, f_ss, subsurface) + f_sheen) + F D G / (4 (n.o)(n.i)) + clearcoat / 4 f_r
     f_d = (1 + (F_D90 - 1) (1 - n.i)^5) (1 + (F_D90 - 1) (1 - n.o)^5),  F_D90 = 1/2 + 2 roughness (i.h)^2
 
     base is `base_color`, and mix(a, b, x) = (1 - x) a + x b. f_d is the diffuse lobe, f_ss the lobe that approximates
-    subsurface scattering, and f_sheen that of the sheen. D is GTR2 (GGX) with alpha = roughness^2, stretched by
-    1 / aspect with aspect^2 = 1 - 0.9 anisotropic. G is Smith's, and F is Schlick's with F0 = 0.08 specular, tinted, or
-    with the base color for metal. f_r is a second lobe, GTR1 with a width from 0.1 to 0.001 and F0 = 0.04. Tints are
-    the base color divided by the mean of its channels (in the paper, by its luminance).
+    subsurface scattering, and f_sheen the sheen lobe. D is GTR2 (GGX) with alpha = roughness^2, stretched by
+    1 / aspect, where aspect^2 = 1 - 0.9 anisotropic. G is Smith's masking term. F is Schlick's approximation; F0 is
+    0.08 specular, with an optional tint, for a dielectric and the base color for a metal. f_r is the clearcoat lobe,
+    GTR1 with a width from 0.1 to 0.001 and F0 = 0.04. The tint is the base color divided by the mean of its channels
+    (in the paper, by its luminance).
 
-    The lobes are simply added, since artists preferred this: at grazing angles, or if several parameters are large, the
-    model reflects more light than it receives, while rough metal loses multiply scattered light. The model is
-    reciprocal.
+    The lobes are simply added, as artists preferred. At grazing angles, or if several parameters are large, the model
+    therefore reflects more light than it receives. Rough metal, on the other hand, loses multiply scattered light. The
+    model is reciprocal.
     """
 
     base_color: Colour = spectrum(default=0.5, doc="color of the surface", low=0.0, high=1.0)
     subsurface: Number = number(
-        default=0.0, doc="flattens the diffuse lobe, as subsurface scattering does", low=0.0, high=1.0
+        default=0.0, doc="weight of the flat diffuse lobe that approximates subsurface scattering", low=0.0, high=1.0
     )
-    metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0)
+    metallic: Number = number(default=0.0, doc="0 for a dielectric, 1 for a metal", low=0.0, high=1.0)
     specular: Number = number(default=0.5, doc="F0 of a dielectric, divided by 0.08", low=0.0, high=1.0)
-    specular_tint: Number = number(default=0.0, doc="fraction of the base color in F0", low=0.0, high=1.0)
-    roughness: Number = number(default=0.5, doc="square root of alpha", low=0.0, high=1.0)
-    anisotropic: Number = number(default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0)
+    specular_tint: Number = number(default=0.0, doc="amount by which the base color tints F0", low=0.0, high=1.0)
+    roughness: Number = number(default=0.5, doc="roughness, the square root of alpha", low=0.0, high=1.0)
+    anisotropic: Number = number(
+        default=0.0, doc="anisotropy, from 0 (isotropic) to 1 (stretched along x)", low=0.0, high=1.0
+    )
     rotation: Angle = microfacet.rotation_angle()
     sheen: Number = number(
         default=0.0, doc="strength of an additional lobe at grazing angles, for cloth", low=0.0, high=1.0
     )
-    sheen_tint: Number = number(default=0.5, doc="fraction of the base color in the sheen", low=0.0, high=1.0)
+    sheen_tint: Number = number(default=0.5, doc="amount by which the base color tints the sheen", low=0.0, high=1.0)
     clearcoat: Number = number(default=0.0, doc="strength of the clearcoat lobe", low=0.0, high=1.0)
-    clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 is glossy", low=0.0, high=1.0)
+    clearcoat_gloss: Number = number(
+        default=1.0, doc="gloss of the clearcoat: 0 is satin, 1 is glossy", low=0.0, high=1.0
+    )
 
-    fits_factors: ClassVar[bool] = True  # clearcoat_gloss is 1 by default, and no factor
+    fits_factors: ClassVar[bool] = True  # clearcoat_gloss is 1 by default but is not a factor
     limits: ClassVar[tuple[Limit, ...]] = (
         Limit({"sheen": 0.0}, mutes=("sheen_tint",)),
         Limit({"clearcoat": 0.0}, mutes=("clearcoat_gloss",)),
@@ -99,7 +104,7 @@ class Disney(BSDF):
     )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "the lobes are added without a bound on their sum, and rough diffuse reflection gains at grazing angles",
+            "the sum of the lobes is unbounded, and rough diffuse reflection gains energy at grazing angles",
             2.5,
             certain=False,
         ),
@@ -192,7 +197,7 @@ class Disney(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Direction:
-        """Probabilities of the specular lobe, the coat and the cosine, by their approximate albedos."""
+        """Probabilities of the specular lobe, the coat and the cosine, proportional to their approximate albedos."""
         at_o = _schlick(wo.z)
         f0 = mean(self._normal_reflectance())
         specular = _mix(f0, 1.0, at_o)
@@ -232,7 +237,7 @@ class Disney(BSDF):
         return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base color and F0."""
+        """The sum of the diffuse color and F0."""
         return self.base_color * (1.0 - self.metallic) + self._normal_reflectance()
 
 

@@ -52,48 +52,55 @@ class _Slabs(OpenPBR):
 
 
 class DisneyBSDF(BSDF):
-    """Disney's principled BSDF of 2015, on energy-conserving slabs: glass, metal and thin walls in one parameter set.
+    """Disney's principled BSDF of 2015 for metal, glass and thin sheets, built from energy-conserving slabs.
 
-    The parameters are those of Burley2015: those of `disney` with the index in place of `specular`, `spec_trans` for
-    glass and, for a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass have the lobes of the paper:
-    GGX with alpha = roughness^2, stretched by sqrt(1 - 0.9 anisotropic). F follows from the index; for metal, it is
-    Schlick's approximation with the base color. Glass is tinted by the square root of the base color at each crossing.
-    Terms that the paper adds are layered here, so no energy is gained, and multiple scattering between facets is
-    included. The slabs are those of `openpbr` and obey the same laws.
+    The parameters are those of Burley2015. Compared with `disney`, the refractive index replaces `specular`,
+    `subsurface` is omitted, and `spec_trans` (for glass), `diff_trans` (for a `thin` sheet) and `flatness` are added.
+    Metal, dielectric and glass have the lobes of the paper: GGX with alpha = roughness^2, stretched by
+    sqrt(1 - 0.9 anisotropic). F is computed from the index; for metal, it is Schlick's approximation with the base
+    color. Glass is tinted by the square root of the base color at each crossing. Lobes that the paper adds are layered
+    here, so no energy is gained, and multiple scattering between facets is included. The slabs are those of `openpbr`
+    and satisfy the same laws.
 
-    The differences from the paper are: the diffuse lobe is `eon` of the same roughness under the dielectric (the lobe
-    of the paper has a rim of its own, which `flatness` removes; here, `flatness` turns `eon` into Lambert); sheen is
-    the `sheen` of fibers; the coat is GGX with the width of the paper's GTR1; masking is height-correlated; tints are
-    the base color divided by its largest channel; and the transmission of a thin sheet is as rough as its reflection.
-    docs/openpbr.md states how large these differences are.
+    The model differs from the paper in these respects: the diffuse lobe is `eon` with the same roughness, below the
+    dielectric (in the paper, `flatness` removes the bright rim of the diffuse lobe; here, it turns `eon` into
+    `lambert`); the sheen lobe is `sheen`; the coat is GGX with the width of the paper's GTR1; masking is
+    height-correlated; the tint is the base color divided by its largest channel; and a thin sheet transmits with the
+    same roughness as it reflects. docs/openpbr.md reports the size of these differences.
     """
 
     name: ClassVar[str] = "disney2015"
     reads_wavelengths: ClassVar[bool] = True
-    fits_factors: ClassVar[bool] = True  # clearcoat_gloss is 1 by default, and no factor
+    fits_factors: ClassVar[bool] = True  # clearcoat_gloss is 1 by default but is not a factor
 
     base_color: Colour = spectrum(default=0.5, doc="color of the surface", low=0.0, high=1.0)
-    metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0, off=0.0)
-    roughness: Number = number(default=0.5, doc="square root of alpha", low=0.0, high=1.0)
-    anisotropic: Number = number(default=0.0, doc="0 is isotropic, 1 stretched along x", low=0.0, high=1.0, off=0.0)
+    metallic: Number = number(default=0.0, doc="0 for a dielectric, 1 for a metal", low=0.0, high=1.0, off=0.0)
+    roughness: Number = number(default=0.5, doc="roughness, the square root of alpha", low=0.0, high=1.0)
+    anisotropic: Number = number(
+        default=0.0, doc="anisotropy, from 0 (isotropic) to 1 (stretched along x)", low=0.0, high=1.0, off=0.0
+    )
     rotation: Angle = rotation_angle()
-    eta: Number = number(default=1.5, doc="index inside divided by index outside", low=1.0, high=3.0)
+    eta: Number = number(default=1.5, doc="refractive index inside divided by that outside", low=1.0, high=3.0)
     specular_tint: Number = number(
-        default=0.0, doc="fraction of the base color in a dielectric's reflection", low=0.0, high=1.0
+        default=0.0, doc="amount by which the base color tints a dielectric's reflection", low=0.0, high=1.0
     )
     spec_trans: Number = number(default=0.0, doc="fraction of the dielectric that is glass", low=0.0, high=1.0, off=0.0)
-    sheen: Number = number(default=0.0, doc="weight of the fibers on a dielectric", low=0.0, high=1.0, off=0.0)
-    sheen_tint: Number = number(default=0.5, doc="fraction of the base color in the sheen", low=0.0, high=1.0)
-    clearcoat: Number = number(default=0.0, doc="strength of the coat", low=0.0, high=1.0, off=0.0)
-    clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 is glossy", low=0.0, high=1.0)
+    sheen: Number = number(default=0.0, doc="weight of the sheen on a dielectric", low=0.0, high=1.0, off=0.0)
+    sheen_tint: Number = number(default=0.5, doc="amount by which the base color tints the sheen", low=0.0, high=1.0)
+    clearcoat: Number = number(default=0.0, doc="strength of the clearcoat", low=0.0, high=1.0, off=0.0)
+    clearcoat_gloss: Number = number(
+        default=1.0, doc="gloss of the clearcoat: 0 is satin, 1 is glossy", low=0.0, high=1.0
+    )
     diff_trans: Number = number(
         default=0.0,
-        doc="for a thin sheet: 0 is opaque, 1 scatters equally to both sides, 2 only transmits",
+        doc="diffuse transmission of a thin sheet: 0 is opaque, 1 scatters equally to both sides, 2 only transmits",
         low=0.0,
         high=2.0,
     )
-    flatness: Number = number(default=0.0, doc="1 removes the roughness of the diffuse lobe", low=0.0, high=1.0)
-    thin: bool = flag(default=False, doc="whether the surface is a sheet without an interior")
+    flatness: Number = number(
+        default=0.0, doc="reduction of the roughness of the diffuse lobe; 1 removes it", low=0.0, high=1.0
+    )
+    thin: bool = flag(default=False, doc="whether the surface is a thin sheet without an interior")
 
     limits: ClassVar[tuple[Limit, ...]] = (
         Limit({"sheen": 0.0}, mutes=("sheen_tint",)),
@@ -103,7 +110,7 @@ class DisneyBSDF(BSDF):
     )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the table of lobes for the sheen depends on the view direction only",
+            "the table of sheen lobes depends on the view direction only",
             lambda model: 4.0 if _some(model.sheen) else 0.0,
             certain=False,
         ),
@@ -118,7 +125,7 @@ class DisneyBSDF(BSDF):
             certain=False,
         ),
         "linearity": KnownViolation(
-            "tints are ratios of the base color, and glass uses its square root", 10.0, certain=False
+            "tints are ratios of color channels, and glass uses the square root of the base color", 10.0, certain=False
         ),
     }
 
@@ -137,7 +144,7 @@ class DisneyBSDF(BSDF):
             return 0.0 if open_ else float(np.min(np.asarray(value, float)))
 
         return _Slabs(
-            base_diffuse_roughness=0.5,  # not a weight: code recorded at 0 must hold for other values too
+            base_diffuse_roughness=0.5,  # not a weight: code recorded at 0 must be valid for other values too
             base_metalness=at("metallic"),
             specular_roughness=rough("roughness"),
             specular_roughness_anisotropy=0.5 if _some(plain.anisotropic) else 0.0,

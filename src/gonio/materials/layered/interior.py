@@ -2,25 +2,25 @@
 
 When the base scatters light along w, the fraction T(w) t(w) of it leaves the coat, and the fraction
 k(w) = (1 - T(w)) t(w)^2 returns to the base, mirrored. T is the transmittance of the interface from inside, and t is
-that of one crossing of the coat. With the scattering operator B of the base, all light that leaves is the series
-B + B k B + B k B k B + ...
+that of one crossing of the coat. With the scattering operator B of the base, the light that leaves is the sum of the
+series B + B k B + B k B k B + ...
 
 The sum is computed for 33 directions, averaged over azimuth: the rows of a matrix P, which includes k, are sampled with
 the lossless variant of the base (`BSDF.lossless`), and X = (1 - P)^-1 E1 solves the series, where E1 is the light that
 leaves after the first bounce. A smooth interface transmits light along one direction. A rough interface is glass with
 Kulla-Conty compensation, for which samples determine where light enters and how much of it leaves.
 
-The base's own Fresnel reflectance is known for its channels: their values, with every albedo set to 1, are computed at
-the samples of the lossless variant. For any other color, it is interpolated between these channels, black and white.
-The series is therefore valid for every channel of a metal, including the rise of its reflectance at grazing angles, and
-for any color by which the rest of the base varies.
+The Fresnel reflectance of the base is known for each of its channels: with every albedo set to 1, its values are
+computed at the samples of the lossless variant. For any other color, it is interpolated between these channels, black
+and white. The series is therefore valid for every channel of a metal, including the rise of its reflectance at grazing
+angles, and for any color by which the rest of the base varies.
 
 The light that leaves toward o is then divided into two terms whose sum is exact:
 
     lobe         the base's own lobe, refracted, times the largest factor for which it does not exceed this light at any
                  o. This is all of the light for a Lambertian base (Saunderson1942), and nearly all of it for a narrow
                  lobe under a smooth coat
-    rest(o)      the remainder, as a separable lobe rest(o) rest(i) / norm, which is reciprocal like Kulla-Conty's
+    rest(o)      the remainder, as a separable lobe rest(o) rest(i) / norm, reciprocal like that of Kulla-Conty
 
 Both terms are tables over the color a and over u, the transmittance of one crossing at normal incidence.
 """
@@ -48,11 +48,11 @@ from ..microfacet.dielectric import Dielectric
 from ._nodes import EPSILON, Floats, Spread, at_nodes, directions, place_of, places
 
 POINTS = 1 << 13  # samples per node
-NODES = 97  # nodes of the tables, at equal steps of the square root of the cosine outside, like R at grazing angles
+NODES = 97  # nodes of the tables, at equal steps of the root of the cosine outside, to resolve R at grazing angles
 ROUGH = 33  # nodes at which a rough interface is sampled
 COLOURS, LEFT = 13, 13  # steps of the color and of the transmittance u, see `colour_place` and `left_place`
 MIN_LEFT = 0.03  # the smallest u, the first step
-CACHE_SIZE = 32  # sets of tables in memory
+CACHE_SIZE = 32  # maximum number of sets of tables in memory
 
 
 class LayerTables(NamedTuple):
@@ -98,7 +98,8 @@ _cache: OrderedDict[object, LayerTables] = OrderedDict()
 
 
 def tables_of(coat: BSDF) -> LayerTables:
-    """The cached tables of an unbound coat. Raises InputError if they must be computed while Dr.Jit records a loop."""
+    """The tables of an unbound coat, from the cache if possible. Raises InputError if they must be computed while
+    Dr.Jit records a loop."""
     own = vars(coat).get("_layer_tables")
     if own is None:
         key = _bright(tree.plain_values(coat))
@@ -155,7 +156,7 @@ def find(coat: Coated) -> LayerTables:
     colors = np.maximum(2.0 * t / (1.0 + t), 1e-4)
     sums = [_series(draws, colors, u, face) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), MIN_LEFT)]
     rest, over_factor, norm = (_continued([one[n] for one in sums]) for n in range(3))
-    # fraction sampled by a cosine: base samples that are totally reflected, and the rest
+    # fraction of cosine samples: those that replace totally reflected base samples, and those of the rest
     share = np.maximum(1.7 * np.interp(np.sqrt(outside), draws.place, draws.totally), 0.7 * sums[-1].share)
     columns = [face.reflected(outside), np.clip(share, 0.05, 0.95), face.lobe(outside), face.beyond(outside)]
     return LayerTables(
@@ -328,7 +329,7 @@ def _series(draws: _Draws, colors: Floats, u: float, face: _Interface) -> _Sum:
         P, first, lobe = (
             sum(m * one for m, one in zip(mixed, parts, strict=True)) for parts in zip(*kinds, strict=True)
         )
-        # light totally reflected over a perfect mirror never leaves, but no light gets there
+        # light totally reflected over a perfect mirror never leaves, but no light reaches these directions
         leaves = enters @ np.linalg.solve(np.eye(n) - P * (1.0 - EPSILON), first)
         some = judged & (lobe > 1e-6 * a)
         factor = float(np.min((leaves / np.maximum(lobe, EPSILON * a))[some], initial=1e3))

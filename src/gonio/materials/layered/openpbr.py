@@ -14,29 +14,29 @@ from . import _openpbr_tables as tables
 from ._openpbr_derived import Between
 from ._openpbr_slabs import _OpenPBR
 
-MAX_RAYS = 1 << 18  # that store derived values, about a hundred numbers each, which halves the compiled code
+MAX_RAYS = 1 << 18  # rays with stored derived values (about a hundred numbers each), which halve the compiled code
 
 
 class OpenPBR(_OpenPBR):
-    """OpenPBR 1.1 (OpenPBR2025): a base of metal, glass or a glossy diffuse body under a thin film, a coat and fuzz.
+    """OpenPBR 1.1 (OpenPBR2025): a metal, glass or glossy-diffuse base under a thin film, a coat and fuzz.
 
     f = opacity {F f_fuzz + (1 - F E_fuzz) [C f_coat + (1 - C + C T W D) f_base]} + the light passing straight through
-    f_base = M f_metal + (1 - M) {f_glossy + (1 - E_o) (1 - E_i) / (1 - E_avg) f_diffuse}, where opaque
+    f_base = M f_metal + (1 - M) {f_glossy + (1 - E_o) (1 - E_i) / (1 - E_avg) f_diffuse} for an opaque base
 
-    F, C and M are the weights of fuzz, coat and metal, `opacity` is `geometry_opacity`, and f_X is the lobe of X. E is
-    an albedo: E_fuzz is that of the fuzz for wo, E_coat that of the coat's surface, E_o and E_i are those of the base's
-    rough dielectric surface for wo and wi, and E_avg is its cosine-weighted mean. T is the color of the coat for the
-    two crossings, along wo and wi, and D is the darkening by interreflection under the coat. W is the transmittance of
-    the coat's surface for both crossings: depending on `layering`, 1 - E_coat(wo), as in the specification's reduction
-    of layers to lobes, or a product of one factor per direction that conserves all light of a white base
-    (docs/openpbr.md). f_diffuse is `eon`, f_fuzz is `sheen`, metal is F82 with multiple scattering, and glass is
-    `dielectric` with multiple scattering.
+    F, C and M are the weights of fuzz, coat and metal, `opacity` is `geometry_opacity`, and f_X is the lobe of the
+    component X. Albedos are denoted by E: E_fuzz is that of the fuzz for wo, E_coat that of the coat's surface, E_o and
+    E_i are those of the base's rough dielectric surface for wo and wi, and E_avg is the cosine-weighted mean of E_o. T
+    is the color of the coat for the two crossings, along wo and wi, and D is the darkening by interreflection under the
+    coat. W is the transmittance of the coat's surface for both crossings. Depending on `layering`, it is
+    1 - E_coat(wo), as in the specification's reduction of layers to lobes, or a product of one factor per direction,
+    which conserves all light of a white base (docs/openpbr.md). f_diffuse is `eon`, f_fuzz is `sheen`, metal is F82
+    with multiple scattering, and glass is `dielectric` with multiple scattering.
 
-    The parameters are those of the specification. Below a roughness of 0.01, base and coat are mirrors. Indices range
-    from 1 to 5. Subsurface scattering is local: with `geometry_thin_walled`, it is as specified; otherwise, it is a
-    diffuse lobe of the subsurface color, which is the limit of radius 0, and a warning is issued. Volume scattering,
-    dispersion and emission raise InputError, since they are not properties of a surface. A `transmission_depth` above 0
-    causes absorption inside, which Gonio's integrators apply.
+    The parameters are those of the specification. A base or coat with a roughness below 0.01 is a mirror. Refractive
+    indices range from 1 to 5. Subsurface scattering is local. With `geometry_thin_walled`, it follows the
+    specification; otherwise, it is a diffuse lobe with the subsurface color, which is the limit for radius 0, and a
+    warning is issued. Volume scattering, dispersion and emission raise InputError, because they are not properties of a
+    surface. If `transmission_depth` is above 0, Gonio's integrators apply absorption inside the base.
     """
 
     name: ClassVar[str] = "openpbr"
@@ -47,7 +47,7 @@ class OpenPBR(_OpenPBR):
         return derived.derive(self)
 
     def _with_derived(self) -> Self:
-        """A copy that stores its derived values even if they differ from ray to ray, since they are used in many
+        """A copy that stores its derived values even if they differ from ray to ray, because they are used in many
         places."""
         if self._derived is not None:
             return self
@@ -76,7 +76,7 @@ class OpenPBR(_OpenPBR):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "fuzz depends on the view direction only, and so does a coat with layering `albedo`",
+            "the fuzz depends on the view direction only, and so does a coat with layering `albedo`",
             lambda model: 4.0 if model.has("fuzz_weight") or model.by_albedo() else 0.0,
             certain=False,
         ),
@@ -86,11 +86,11 @@ class OpenPBR(_OpenPBR):
             certain=False,
         ),
         "limits": KnownViolation(
-            "the table of multiple scattering in metal is coarser for two widths and for widths that vary in space",
+            "the table of multiple scattering in metal is coarser for anisotropic and for spatially varying alpha",
             0.02,
             certain=False,
         ),
         "linearity": KnownViolation(
-            "the colors of layers are multiplied, more than once for interreflected light", 10.0, certain=False
+            "the colors of layers are multiplied, and more than once for interreflected light", 10.0, certain=False
         ),
     }

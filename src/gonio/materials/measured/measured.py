@@ -1,4 +1,4 @@
-"""A measured material: a table as a BSDF."""
+"""A measured material: a BSDF that reads a table."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ class Measured(BSDF):
     """A table of measured values, interpolated in its own coordinates (course notes, part B).
 
     The supported formats are MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf),
-    neural networks (.npz, as FILE.npz:NAME) and Gonio's .gonio; docs/measured.md describes each format. Data are not
-    corrected: negative values remain negative, an albedo above 1 remains above 1, and a table that is not reciprocal
-    remains so. The material only reflects; it is black from below. A table is sampled by its own densities (RGL) or by
-    a density computed from its values.
+    neural networks (.npz, as FILE.npz:NAME) and Gonio's .gonio; docs/measured.md describes each format. The data are
+    not corrected: negative values remain negative, an albedo above 1 remains above 1, and a table that is not
+    reciprocal remains so. The material only reflects and is black from below. A table is sampled by the densities in
+    its file (RGL) or by a density computed from its values.
     """
 
     file: str = file(
         default=SAMPLE,
-        doc="file of measured values; `FILE:ITEM` selects one of several tables in it; `sample` is included with Gonio",
+        doc="file of measured values; `FILE:ITEM` selects one of its tables; `sample` is a table included with Gonio",
     )
     only_rgb: ClassVar[bool] = True
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
@@ -38,17 +38,17 @@ class Measured(BSDF):
             "measured values are not corrected", lambda model: 0.0 if model.table.reciprocal else 2.0, certain=False
         ),
         "positivity": KnownViolation(
-            "negative values were measured and are not corrected; relative to the largest value",
+            "negative measured values are not corrected (size relative to the largest value)",
             lambda model: 1.0 if model.table.flaws.get("negative") else 0.0,
             certain=False,
         ),
         "isotropy": KnownViolation(
-            "the table is not mirror-symmetric, or its lookup computes sums that lose digits at the edge of a lobe",
+            "the table is not mirror-symmetric, or sums in its lookup lose digits at the edge of a lobe",
             lambda model: 0.0 if model.table.mirrored else 2.0,
             certain=False,
         ),
         "precision": KnownViolation(
-            "the table lookup computes sums that lose digits at the edge of a lobe",
+            "sums in the table lookup lose digits at the edge of a lobe",
             lambda model: 0.1 if model.table.sums else 0.0,
             certain=False,
         ),

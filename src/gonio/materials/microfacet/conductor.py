@@ -1,4 +1,4 @@
-"""Torrance-Sparrow conductor."""
+"""The Torrance-Sparrow conductor."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from .reflector import _Reflector
 
 
 class Conductor(_Reflector):
-    """Rough metal: f = albedo F D G / (4 (n.o)(n.i)), F at the half vector (Torrance1967; course sheet, eq. 4 to 11).
+    """A rough metal: f = albedo F D G / (4 (n.o)(n.i)) (Torrance1967; course sheet, eq. 4 to 11).
 
-    D, G and F are chosen by name (`ndf`, `masking`, `fresnel`). For alpha below 1e-4, the surface is a perfect mirror.
-    Light that would be scattered more than once is lost; at alpha = 1, this is more than half of the light.
+    F is evaluated at the half vector. D, G and F are selected by `ndf`, `masking` and `fresnel`. If alpha is below
+    1e-4, the surface is a perfect mirror. Multiply scattered light is lost; at alpha = 1, this is more than half of the
+    light.
     """
 
     eta: Colour = spectrum(default=0.0, doc="real part of the refractive index, relative to the outside", low=0.0)
@@ -30,7 +31,7 @@ class Conductor(_Reflector):
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
     fresnel: Member = microfacet.fresnel_choice()
-    albedo: Colour = microfacet.albedo_factor("factor on all reflected light")
+    albedo: Colour = microfacet.albedo_factor("scale factor of all reflected light")
     sampling: str = microfacet.sampling_choice()
 
     preset_kind: ClassVar[str] = "metal"
@@ -43,7 +44,7 @@ class Conductor(_Reflector):
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
-        """`albedo` times F at the cosine of incidence on a facet, by the formula that `fresnel` names."""
+        """`albedo` times F at the cosine of incidence on a facet, by the formula that `fresnel` selects."""
         return self.albedo * fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, self.k)
 
     def _polarization(self, cos_theta: Scalar) -> Diattenuation[Spectrum]:

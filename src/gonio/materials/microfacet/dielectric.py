@@ -1,4 +1,4 @@
-"""Torrance-Sparrow dielectric with transmission."""
+"""The Torrance-Sparrow dielectric with transmission."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class _Facet(NamedTuple):
     m             normal of the facet, m.z >= 0
     dot_o, dot_i  o.m and i.m
     reflects      whether wi lies on wo's side
-    lit           whether a rough lobe has light for the pair
+    lit           whether a rough lobe can be nonzero for the pair
     alpha         widths along x and y
     spread        |o.m| dm/dwi (Walter2007, eq. 14); for refraction (eq. 17), divided by eta^2
     """
@@ -47,35 +47,34 @@ class _Facet(NamedTuple):
 
 
 class Dielectric(microfacet._Microfacet):
-    """Rough glass: reflection F D G / (4 (n.o)(n.i)) and refraction by Walter2007, eq. 21.
+    """Rough glass: microfacet reflection, F D G / (4 (n.o)(n.i)), and refraction (Walter2007, eq. 21).
 
-    With eta = eta_i / eta_o (the indices on the sides of wi and wo) and the facet's normal m along +-(wo + eta wi),
-    f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2). This is the form for radiance, with the
-    factor 1 / eta^2 for the change of radiance on refraction; the mode "importance" omits this factor. For alpha below
-    1e-4, the glass is smooth; for eta = 1, there is no surface. With `transmission=False`, light is only reflected.
-
-    Absorption inside (`absorption`, by the Beer-Lambert law exp(-absorption length)) and the choice among overlapping
-    media (`priority`, Schmidt2002) are properties of paths: Gonio's integrators apply them, and the values of the
-    surface do not depend on them.
+    Let eta = eta_i / eta_o be the ratio of the indices on the sides of wi and wo, and let m be the facet normal, which
+    is parallel to +-(wo + eta wi). The refracted lobe is f_t = albedo |o.m| |i.m| (1 - F) D
+    G / (|o.n| |i.n| (o.m + eta i.m)^2). This is the form for radiance, which includes the factor 1 / eta^2 for the
+    change of radiance on refraction; in the mode "importance", this factor is omitted. If alpha is below 1e-4, the
+    glass is smooth; if eta = 1, there is no surface. With `transmission=False`, light is only reflected. Gonio's
+    integrators apply absorption inside the glass (`absorption`, by the Beer-Lambert law exp(-absorption length)) and
+    choose among overlapping media (`priority`, Schmidt2002); the values of the BSDF do not depend on these parameters.
     """
 
     eta: Index = index(
-        default=1.5, doc="index inside divided by index outside, or the name of a substance", low=0.2, high=5.0
+        default=1.5, doc="refractive index inside divided by that outside, or a substance's name", low=0.2, high=5.0
     )
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
     fresnel: Member = microfacet.fresnel_choice()
-    albedo: Colour = microfacet.albedo_factor("factor on all reflected and transmitted light")
+    albedo: Colour = microfacet.albedo_factor("scale factor of all reflected and transmitted light")
     transmission: bool = flag(default=True, doc="whether refracted light is transmitted; otherwise it is lost")
     sampling: str = microfacet.sampling_choice()
     absorption: Colour = spectrum(
-        default=0.0, doc="absorption coefficient inside", low=0.0, unit="1/length", inside=True
+        default=0.0, doc="absorption coefficient of the medium inside", low=0.0, unit="1/length", inside=True
     )
     priority: Number = number(
         default=0.0,
-        doc="where media overlap, the one with the highest priority applies",
+        doc="priority of the medium; where media overlap, the one with the highest priority applies",
         low=-1e6,
         high=1e6,
         inside=True,
@@ -91,8 +90,8 @@ class Dielectric(microfacet._Microfacet):
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """F by the formula that `fresnel` names, at the cosines of incidence, cos_o, and of transmission, cos_t (0 for
-        total reflection)."""
+        """F by the formula that `fresnel` selects, at the cosines of incidence, cos_o, and of transmission, cos_t (0
+        for total reflection)."""
         return fresnel.kind(self.fresnel).dielectric(cos_o, cos_t, eta)
 
     @function
@@ -130,7 +129,7 @@ class Dielectric(microfacet._Microfacet):
     def _reflectance_at(self, facet: _Facet, eta: Scalar) -> Scalar:
         """F of the facet."""
         cos_o = abs(facet.dot_o)
-        # for refraction, wi is known: the root in Snell's law would lose its cosine near the critical angle
+        # for refraction, the cosine of wi is used: the root in Snell's law is inaccurate near the critical angle
         cos_t = where(facet.reflects, fresnel.cos_transmitted(cos_o, eta), abs(facet.dot_i))
         return self.reflectance(cos_o, cos_t, eta)
 
@@ -201,7 +200,7 @@ class Dielectric(microfacet._Microfacet):
         wi = frame.rotate_back(wi, self.rotation)
         sides = wo.z * wi.z
         right_side = where(reflects, sides > 0.0, sides < 0.0)
-        # m recomputed from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        # m is recomputed from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
         facet = self._facet(wo, wi, eta)
         squeeze = self._squeeze(reflects, eta)
         value = where(smooth, 1.0 / squeeze, self._value(facet))
@@ -217,7 +216,7 @@ class Dielectric(microfacet._Microfacet):
         """All light, polarized according to the exact equations; the chosen Fresnel kind affects only its amount."""
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
-        m = where(delta, frame.normal_like(wo), m)  # equal indices: light goes straight on, no normal
+        m = where(delta, frame.normal_like(wo), m)  # equal indices: no refraction, so m is undefined
         cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
         reflects = wo.z * wi.z > 0.0
         f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
@@ -243,7 +242,7 @@ class Dielectric(microfacet._Microfacet):
         return Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
 
     def _widths(self) -> tuple[Pair, Mask]:
-        """The widths, and whether the surface is smooth. It is also smooth for equal indices, since light then passes
+        """The widths, and whether the surface is smooth. It is also smooth for equal indices, because light then passes
         straight through."""
         alpha, smooth = widths(self.alpha)
         if self.transmission:
@@ -286,8 +285,8 @@ class Dielectric(microfacet._Microfacet):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The albedo of smooth glass: `albedo`, since nothing else is absorbed, or without transmission `albedo` times
-        F; None for rough glass."""
+        """The albedo of smooth glass: `albedo`, because no other light is lost, or `albedo` times F without
+        transmission; None for rough glass."""
         if self.delta != "always":
             return None
         albedo = np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))

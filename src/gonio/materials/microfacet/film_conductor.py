@@ -12,7 +12,7 @@ from ...optics.fresnel import film
 from ...optics.fresnel.polarization import Diattenuation
 from .conductor import Conductor
 
-FRESNELS = {"exact": "interference of the waves reflected in the film", "one": "F = 1, without any loss"}
+FRESNELS = {"exact": "interference of the waves reflected in the film", "one": "F = 1, a perfect mirror"}
 
 
 def thickness_number() -> Number:
@@ -22,7 +22,7 @@ def thickness_number() -> Number:
 
 def film_index() -> Number:
     """Declare the film's index."""
-    return number(default=1.38, doc="index of the film, relative to the outside", low=1.0, high=3.0)
+    return number(default=1.38, doc="refractive index of the film, relative to the outside", low=1.0, high=3.0)
 
 
 def film_form() -> str:
@@ -36,11 +36,11 @@ def bare(one: Conductor) -> Conductor:
 
 
 class FilmConductor(Conductor):
-    """Rough metal under a thin clear film: a `conductor` whose F has the film's interference colors (Belcour2017).
+    """A rough metal under a thin clear film: `conductor` with thin-film interference in F (Belcour2017).
 
-    The film covers every facet. In spectral variants, F is evaluated per wavelength; otherwise, `form` determines how
-    RGB colors are computed, with the metal's indices at 650, 550 and 450 nm, interpolated linearly. For films thicker
-    than 2 or 3 um, the fringes are closer together than the 20 nm steps of `local`.
+    The film covers each facet. In spectral variants, F is evaluated at each wavelength. In RGB variants, `form`
+    determines how the color of F is computed; the metal's indices are given at 650, 550 and 450 nm and interpolated
+    linearly. For films thicker than 2 or 3 um, the 20 nm steps of `local` do not resolve the fringes.
     """
 
     if TYPE_CHECKING:  # the conductor's parameters, which mypy does not recognize as declared

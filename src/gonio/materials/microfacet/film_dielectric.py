@@ -25,12 +25,11 @@ def bare(one: Dielectric) -> Dielectric:
 
 
 class FilmDielectric(Dielectric):
-    """Rough glass under a thin clear film: a `dielectric` whose F has the film's interference colors (Belcour2017).
+    """Rough glass under a thin clear film: `dielectric` with thin-film interference in F (Belcour2017).
 
-    Light that the film does not reflect is transmitted, in the complementary colors. The film is on the outside: for
-    light from inside, the Fresnel reflectance F is evaluated at the refracted direction, outside. `form` and its
-    limitations are those of `film-conductor`. With eta = film_eta = 1, there is no surface; eta = 1 with
-    film_eta = 1.33 is a soap bubble.
+    Light that the film does not reflect is transmitted, in the complementary colors. The film is on the outside; for
+    light from inside, F is evaluated for the refracted direction outside. `form` and its limitations are the same as in
+    `film-conductor`. With eta = film_eta = 1, there is no surface; eta = 1 and film_eta = 1.33 represent a soap bubble.
     """
 
     if TYPE_CHECKING:  # the dielectric's parameters, which mypy does not recognize as declared
@@ -77,7 +76,7 @@ class FilmDielectric(Dielectric):
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """As in `Dielectric`, except that the mean of the color is the probability of a lobe."""
-        _, smooth = self._widths()  # light that is not deflected determines no facet
+        _, smooth = self._widths()  # no facet is determined if light is not deflected
         cos_o, cos_i = (
             where(smooth, abs(w.z), abs(dot)) for w, dot in ((facet.wo, facet.dot_o), (facet.wi, facet.dot_i))
         )
@@ -90,8 +89,8 @@ class FilmDielectric(Dielectric):
     def _polarization(  # type: ignore[override]
         self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
     ) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
-        """As in `Dielectric`; from inside, by the Stokes relations, with equal amounts and the phases of time
-        reversal."""
+        """As in `Dielectric`. For light from inside, the Stokes relations are used: the amounts are equal, and the
+        phases are those of time reversal."""
         inside = self._inside(eta)
         cos_t = fresnel.cos_transmitted(cos_o, eta)
         back, _ = film.polarization(where(inside, cos_t, cos_o), self._film())
@@ -109,7 +108,7 @@ class FilmDielectric(Dielectric):
 
     @property
     def microsurface(self) -> Microsurface | None:  # type: ignore[override]
-        """None, since the energy tables are those of bare glass."""
+        """None, because the energy tables are those of bare glass."""
         return None
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:  # type: ignore[override]

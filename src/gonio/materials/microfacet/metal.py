@@ -14,33 +14,34 @@ from ...optics.fresnel.schlick import schlick
 from . import microfacet
 from .reflector import _Reflector
 
-FRESNELS = {"f82": "Schlick's curve, corrected at 82 degrees", "one": "F = 1, without any loss"}
+FRESNELS = {"f82": "Schlick's approximation, corrected at 82 degrees", "one": "F = 1, a perfect mirror"}
 
 
 class Metal(_Reflector):
-    """Rough metal with artist-friendly parameters: a color at normal incidence, and a tint at the edge (F82-tint,
-    Kutz2021).
+    """A rough metal with artist-friendly parameters: the color at normal incidence and the tint at the edge
+    (F82-tint, Kutz2021).
 
-    f = albedo F D G / (4 (n.o)(n.i)), with F = r0 at normal incidence, F = 1 at 90 degrees and, at 82 degrees,
-    F = `edge` times the value of Schlick's curve; an edge of 1 thus gives Schlick's curve. This is the metal of
-    OpenPBR. It has no refractive index: thin films and polarization require a `conductor`.
+    f = albedo F D G / (4 (n.o)(n.i)), with F = r0 at normal incidence and F = 1 at 90 degrees. At 82 degrees, F is
+    `edge` times the value of Schlick's approximation; edge = 1 therefore gives Schlick's approximation. OpenPBR uses
+    this model for metals. It has no refractive index, which thin films and polarization require; for these, use
+    `conductor`.
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "linearity": KnownViolation("for an edge below 0.5 and a dark r0, F is clamped to 0", 1.0, certain=False),
+        "linearity": KnownViolation("for `edge` below 0.5 and a dark `r0`, F is clamped to 0", 1.0, certain=False),
         "precision": KnownViolation(
-            "near the angles where F is clamped to 0, it is a difference of nearly equal numbers", 0.01, certain=False
+            "near the angles at which F is clamped to 0, F is a difference of nearly equal numbers", 0.01, certain=False
         ),
     }
 
     r0: Colour = spectrum(default=0.9, doc="reflectance at normal incidence", low=0.0, high=1.0, soft_high=True)
-    edge: Colour = spectrum(default=1.0, doc="factor on Schlick's curve at 82 degrees", low=0.0, high=1.0)
+    edge: Colour = spectrum(default=1.0, doc="F at 82 degrees, relative to Schlick's approximation", low=0.0, high=1.0)
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()  # type: ignore[assignment]  # mypy mistakes an inherited field
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
     fresnel: str = choice("f82", "Fresnel reflectance", FRESNELS, white="one")
-    albedo: Colour = microfacet.albedo_factor("factor on all reflected light")
+    albedo: Colour = microfacet.albedo_factor("scale factor of all reflected light")
     sampling: str = microfacet.sampling_choice()
 
     @function

@@ -1,4 +1,4 @@
-"""The base of the microfacet materials: facts, sampling of normals, and D G divided by the cosines."""
+"""The base class of the microfacet materials: facts, sampling of normals, and D G divided by the cosines."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ...optics.ndf import NDF, distribution
 from ...optics.roughness import SMOOTH, widths
 
 SAMPLINGS = {
-    "visible": "the normals visible from wo",
-    "bounded": "visible normals that can reflect wo above the surface (GGX reflection only; else as `visible`)",
-    "normals": "all normals, with density D cos",
+    "visible": "normals that are visible from wo",
+    "bounded": "visible normals that can reflect wo above the surface (GGX reflection only; otherwise as `visible`)",
+    "normals": "all normals, with density D cos theta_m",
 }
 
 
@@ -37,12 +37,12 @@ class Terms(NamedTuple):
 
 def alpha_width() -> Width:
     """Declare the width of the microfacet distribution."""
-    return width(default=0.1, doc="width of the microfacet distribution; two for anisotropy")
+    return width(default=0.1, doc="width of the microfacet distribution; for anisotropy, a pair along x and y")
 
 
 def rotation_angle() -> Angle:
     """Declare the rotation of the axes of anisotropy."""
-    return angle(default=0.0, doc="rotation of the axes of anisotropy about the normal, from dp/du")
+    return angle(default=0.0, doc="rotation of the anisotropy axes about the normal, measured from dp/du")
 
 
 def ndf_choice() -> Member:
@@ -64,17 +64,18 @@ def fresnel_choice() -> Member:
 
 
 def sampling_choice() -> str:
-    """Declare the choice of the normals to be sampled."""
-    return choice("visible", "which normals are sampled", SAMPLINGS)
+    """Declare the choice of the normals that are sampled."""
+    return choice("visible", "which microfacet normals are sampled", SAMPLINGS)
 
 
 def albedo_factor(doc: str) -> Colour:
-    """Declare the factor on all scattered light, with a given documentation."""
+    """Declare the scale factor of all scattered light, with a given documentation."""
     return spectrum(default=1.0, doc=doc, low=0.0, high=1.0, soft_high=True)
 
 
 class _Microfacet(BSDF):
-    """A rough surface of mirror or glass facets: the shared properties of conductor, metal and dielectric."""
+    """A rough surface whose facets reflect or refract like smooth interfaces: the base of conductor, metal and
+    dielectric."""
 
     if TYPE_CHECKING:  # declared by each class, in the order of its constructor's arguments
         alpha: Width
@@ -138,19 +139,19 @@ def delta_of(alpha: object) -> Delta:
 
 @function
 def upper(w: Direction) -> Direction:
-    """w if it lies above the surface, else -w, from which the front of a facet looks like its back from w."""
+    """w if it lies above the surface, else -w: the front of a facet, seen from -w, looks like its back, seen from w."""
     return where(w.z < 0.0, -w, w)
 
 
 def _bounded(model: _Microfacet) -> bool:
-    """Whether `sample_bounded` may be used: not if the material transmits, since the facets that it excludes could
-    still transmit."""
+    """Whether `sample_bounded` may be used. If the material transmits, it may not, because the facets that it excludes
+    could still transmit."""
     return model.sampling == "bounded" and not model.transmits
 
 
 @function
 def sample_normal(model: _Microfacet, wo: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-    """A normal (m.z > 0) sampled by the method that the model's `sampling` names; from a wo below the surface, facets
+    """A normal (m.z > 0), sampled by the method that the model's `sampling` selects; if wo is below the surface, facets
     are seen from behind."""
     ndf = distribution(model.ndf)
     if model.sampling == "normals":

@@ -16,9 +16,9 @@ from ...optics.fresnel.polarization import Diattenuation
 
 
 class Mirror(BSDF):
-    """Ideal reflection, a delta lobe (course notes, part B).
+    """An ideal mirror, whose BRDF is a delta lobe (course notes, part B).
 
-    All light leaves at theta_o = theta_i, phi_o = phi_i + pi.
+    All light is reflected into the direction theta_o = theta_i, phi_o = phi_i + pi.
     """
 
     albedo: Colour = spectrum(default=1.0, doc="fraction of light that is reflected", low=0.0, high=1.0, soft_high=True)

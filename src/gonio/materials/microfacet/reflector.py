@@ -1,4 +1,4 @@
-"""A rough reflecting surface with any Fresnel reflectance: the base of the conductor and the artist's metal."""
+"""A rough reflecting surface with any Fresnel reflectance: the base class of `conductor` and `metal`."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from .microfacet import Terms
 
 
 class _Reflector(microfacet._Microfacet):
-    """f = F D G / (4 (n.o)(n.i)), F at the half vector. A subclass defines `reflectance` and `mean_reflectance`."""
+    """f = F D G / (4 (n.o)(n.i)), with F at the half vector. A subclass defines `reflectance` and
+    `mean_reflectance`."""
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """`albedo` times F at the cosine of incidence on a facet."""
         raise NotImplementedError(f"{type(self).__name__} has no reflectance")
 
     def _facet(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction, Direction, Pair, Mask]:
-        """wo, wi, the normal m of the facet that mirrors one into the other, the widths, and whether a rough lobe has
-        light for the pair. The directions are in the frame of the anisotropy; m is computed before the rotation, whose
-        rounding errors wo + wi would magnify.
+        """wo, wi, the normal m of the facet that mirrors one into the other, the widths, and whether a rough lobe can
+        be nonzero for the pair. The directions are in the frame of the anisotropy; m is computed before the rotation,
+        because wo + wi would magnify its rounding errors.
         """
         m = frame.half_vector(wo, wi)
         alpha, smooth = self._roughness()
@@ -47,7 +48,7 @@ class _Reflector(microfacet._Microfacet):
         wo_local = frame.rotate(wo, self._turn)
         m = where(smooth, frame.normal_like(wo), microfacet.sample_normal(self, wo_local, u.y, u.z, alpha))
         wi = frame.rotate_back(frame.reflect(wo_local, m), self._turn)
-        # m recomputed from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        # m is recomputed from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
         wo_local, wi_local, m, alpha, lit = self._facet(wo, wi)
         density = 0.25 * microfacet.pdf_per_cosine(self, wo_local, m, alpha)
         facets = where(lit, safe_div(microfacet.reflection(self, wo_local, wi_local, m, alpha), density), 0.0)

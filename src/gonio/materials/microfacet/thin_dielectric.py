@@ -20,8 +20,8 @@ from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass
 from . import microfacet
 
 BOUNCES = {
-    "polarized": "summed separately for s and p polarization, which a smooth sheet does not mix",
-    "mean": "summed for their mean, as in most renderers; all light leaves unpolarized",
+    "polarized": "bounces are summed separately for s and p polarization, which a smooth sheet does not mix",
+    "mean": "bounces are summed for the mean of s and p, as in most renderers; outgoing light is unpolarized",
 }
 
 
@@ -43,23 +43,24 @@ class ThinDielectric(BSDF):
     """A thin sheet of clear glass, such as a window pane. Light that is not reflected passes straight through (PBRT4,
     sec. 9.5).
 
-    With R the reflectance of one face and T = 1 - R, light that bounces between the two faces gives the sheet the
-    reflectance R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R) and the transmittance T' = 1 - R'. The sheet is assumed
-    to be thicker than the coherence length of the light, but too thin to displace it visibly. R' is the mean of its
-    values for the two polarizations: 0.152 at 60 degrees for an index of 1.5. With `bounces="mean"`, R' is computed
-    from the mean R instead, as in renderers without polarization, which gives 0.164.
+    If one face has the reflectance R and the transmittance T = 1 - R, the reflectance of the sheet, including all
+    bounces between its faces, is R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R), and its transmittance is T' = 1 - R'.
+    The sheet is assumed to be thicker than the coherence length of the light, but too thin to displace it visibly. By
+    default, R' is the mean of its values for the two polarizations, which is 0.152 at 60 degrees for an index of 1.5.
+    With `bounces="mean"`, R' is computed from the mean of R instead, as in renderers without polarization, which gives
+    0.164.
     """
 
-    eta: Number = number(default=1.5, doc="index of the sheet, relative to its surroundings", low=0.2, high=5.0)
+    eta: Number = number(default=1.5, doc="refractive index of the sheet, relative to the outside", low=0.2, high=5.0)
     fresnel: Member = microfacet.fresnel_choice()
-    bounces: str = choice("polarized", "which reflectance is summed over the bounces", BOUNCES)
-    albedo: Colour = microfacet.albedo_factor("factor on all reflected and transmitted light")
+    bounces: str = choice("polarized", "how the bounces inside the sheet are summed", BOUNCES)
+    albedo: Colour = microfacet.albedo_factor("scale factor of all reflected and transmitted light")
 
     preset_kind: ClassVar[str] = "medium"
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
-        """Transparent media by name, with eta for sodium light, since a sheet does not disperse light."""
+        """Transparent media by name, with eta for sodium light, because a sheet does not disperse light."""
         return {name: Preset(m.title, {"eta": m.sodium}, m.source) for name, m in indices.media().items()}
 
     @function
@@ -72,7 +73,7 @@ class ThinDielectric(BSDF):
         return _all_bounces(fresnel.kind(self.fresnel).dielectric(cos, cos_t, self.eta))
 
     def _sheet(self, cos: Scalar, cos_t: Scalar) -> _Sheet:
-        """The sum of all bounces; powers are added, since waves of different bounces are incoherent."""
+        """The sum of all bounces; powers are added, because waves of different bounces are incoherent."""
         minus_r_s, r_p = exact.amplitudes(cos, cos_t, self.eta)
         s, p, once = sqr(minus_r_s), sqr(r_p), -minus_r_s * r_p
         through = (1.0 - s) * (1.0 - p)  # both faces
@@ -100,7 +101,7 @@ class ThinDielectric(BSDF):
         return Sample(where(reflects, mirrored, -wo), self.albedo * one, pdf, pdf > 0.0, one)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All light; for `bounces="mean"` none, since polarization is lost between the bounces."""
+        """All light; none for `bounces="mean"`, because polarization is then lost between the bounces."""
         if self.bounces == "mean":
             return ()
         cos = abs(wo.z)
@@ -131,7 +132,7 @@ class ThinDielectric(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64]:
-        """`albedo`, since nothing else is absorbed."""
+        """`albedo`, because no other light is lost."""
         return np.array(np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3)))
 
 

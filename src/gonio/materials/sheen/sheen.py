@@ -35,17 +35,18 @@ class Layer(NamedTuple):
 
 
 class Sheen(BSDF):
-    """Light scattered by a thin layer of upright fibers: f cos theta_i = albedo R(wo) D(wo, wi) (Zeltner2022).
+    """Sheen of a thin layer of upright fibers: f cos theta_i = albedo R(wo) D(wo, wi) (Zeltner2022).
 
-    D is a linearly transformed cosine (Heitz2016a), fitted to random walks in a layer of lossless microflakes of unit
-    density and thickness, so it includes all orders of scattering. R is the albedo of the layer: the rest of the light
-    passes to the surface below, which this model does not include. The color is only a scale factor, although absorbing
-    fibers would tint later bounces more. Sampling is exact: every sample has the weight albedo R.
+    D is a linearly transformed cosine (Heitz2016a) that was fitted to random walks in a layer of lossless microflakes
+    of unit density and thickness; it includes all orders of scattering. R is the albedo of the layer; the remaining
+    light reaches the surface below, which is not part of this model. `albedo` is only a scale factor, although
+    absorbing fibers would tint later bounces more strongly. Sampling is exact: every sample has the weight albedo R.
 
-    The fit depends on wo only, so the model is not reciprocal. Its table has 32 x 32 nodes, interpolated linearly.
+    The model is not reciprocal, because the fit depends on wo only. The fit is a table of 32 x 32 nodes that is
+    interpolated linearly.
     """
 
-    albedo: Colour = spectrum(default=1.0, doc="factor on all reflected light", low=0.0, high=1.0, soft_high=True)
+    albedo: Colour = spectrum(default=1.0, doc="scale factor of all reflected light", low=0.0, high=1.0, soft_high=True)
     roughness: Number = number(
         default=0.5,
         doc="square root of the flakes' cross section: 0 for fibers along the normal, 1 for random directions",
@@ -59,7 +60,7 @@ class Sheen(BSDF):
 
     @function
     def _lobe(self, wo: Direction) -> Layer:
-        """The entry of the table, interpolated."""
+        """The interpolated entry of the table."""
         table = _table()
         rows, columns = table.shape
         return Layer(*ops.lookup(table, ops.inset(self.roughness, rows), ops.inset(wo.z, columns)))
@@ -101,7 +102,7 @@ class Sheen(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64]:
-        """albedo R, from above."""
+        """albedo R for wo above the surface."""
         alpha = np.full(len(mu), float(self.roughness))  # type: ignore[arg-type]
         rows, columns = _table().shape
         R = read_in_numpy(_table(), ops.inset(alpha, rows), ops.inset(np.maximum(mu, 0.0), columns))[2]

@@ -22,24 +22,24 @@ WIDE = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
 
 
 class SheenCharlie(BSDF):
-    """Cloth of upright fibers: f = albedo D G / (4 (n.o)(n.i)), "Charlie" sheen (Estevez2017).
+    """The "Charlie" sheen of cloth with upright fibers: f = albedo D G / (4 (n.o)(n.i)) (Estevez2017).
 
-    D = (2 + 1 / alpha) sin(theta_m)^(1 / alpha) / (2 pi), which has its peak at the horizon instead of the normal
-    G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), with mu = cos theta and Lambda = exp L(mu), L fitted in the paper
+    D = (2 + 1 / alpha) sin(theta_m)^(1 / alpha) / (2 pi), with its peak at the horizon instead of the normal
+    G = 1 / (1 + Lambda(mu_o) + Lambda(mu_i)), with mu = cos theta, Lambda = exp L(mu) and a fitted L
 
     The softened terminator of the paper is omitted, because it is not reciprocal. There is no Fresnel term, and only
     single scattering is modeled: at normal incidence, the model reflects a fifth of the light at alpha = 1 and a
-    thousandth at alpha = 0.1. The rest passes to the cloth below, which this model does not include. This is the sheen
-    of glTF, with alpha the square of glTF's roughness. For alpha below 0.07, the model reflects more light than it
-    receives near the horizon. It is sampled by a guide (a tabulated density).
+    thousandth at alpha = 0.1. The remaining light reaches the cloth below, which is not part of this model. This is the
+    sheen of glTF, where alpha is the square of the sheen roughness. If alpha is below 0.07, the model reflects more
+    light than it receives near the horizon. It is sampled by a guide, a density tabulated from `eval`.
     """
 
-    albedo: Colour = spectrum(default=1.0, doc="factor on all reflected light", low=0.0, high=1.0, soft_high=True)
-    alpha: Number = number(default=0.3, doc="spread of the facets' normals about the horizon", low=0.01, high=1.0)
+    albedo: Colour = spectrum(default=1.0, doc="scale factor of all reflected light", low=0.0, high=1.0, soft_high=True)
+    alpha: Number = number(default=0.3, doc="spread of the microfacet normals about the horizon", low=0.01, high=1.0)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "for alpha below 0.07, the fit of Lambda gives too little masking: the albedo exceeds 1 at 89 degrees",
+            "for alpha below 0.07, the fit of Lambda gives too little masking, and the albedo exceeds 1 at 89 degrees",
             lambda model: _gain(model),
             certain=False,
         )
@@ -47,7 +47,7 @@ class SheenCharlie(BSDF):
 
     @function
     def _density(self, h: Direction) -> Scalar:
-        """D, from sin^2 = x^2 + y^2, since the exponent 1 / alpha can be large."""
+        """D, computed from sin^2 = x^2 + y^2, because the exponent 1 / alpha can be large."""
         power = 1.0 / self.alpha
         sin2 = frame.sin2(h)
         positive = sin2 > frame.TINY

@@ -1,1 +1,1 @@
-"""Compression of measured materials: one method per file, and `compress` for all of them."""
+"""Compression of measured materials: one method per file, and the function `compress`, which applies them."""

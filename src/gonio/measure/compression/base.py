@@ -13,14 +13,14 @@ from ..tables.base import Measurement
 from ..tables.half_difference import HalfDifference, sampled
 
 CELLS = (90, 90, 180)
-ONE_WAY = 0.01  # relative change of f by swapping wo and wi above which a full turn of phi_d is stored
+ONE_WAY = 0.01  # if swapping wo and wi changes f by more than this, relative, a full turn of phi_d is stored
 
 
 class Method:
-    """A method of representing a table in fewer bytes.
+    """A method of compressing tables.
 
-    name    its name on the command line
-    shared  whether several materials are represented together, in one file, with shared data
+    name    name on the command line
+    shared  whether several materials are compressed together, with shared data in one file
     """
 
     family: ClassVar[Family[Method]]
@@ -28,9 +28,9 @@ class Method:
     shared: ClassVar[bool] = False
 
     def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
-        """The compressed tables, of kinds that `.gonio` files can hold.
+        """The compressed tables, whose kinds can be stored in `.gonio` files.
 
-        size  bytes per material, approximately; ignored by a kind of fixed size
+        size  approximate number of bytes per material; ignored if the kind has a fixed size
         Raises InputError for tables to which the method does not apply.
         """
         raise NotImplementedError
@@ -40,8 +40,10 @@ Method.family = Family("method", "gonio.compression", ["gonio.measure.compressio
 
 
 def over_half_vectors(table: Measurement) -> HalfDifference:
-    """The table itself if it is an RGB table over half vector and difference angle; else one of MERL's size, over a
-    full turn of phi_d if swapping the two directions matters."""
+    """The table itself if it is an RGB table over half and difference angles; otherwise, a table of MERL's size.
+
+    The latter covers a full turn of phi_d if the material is not reciprocal.
+    """
     if isinstance(table, HalfDifference) and table.values.shape[-1] == 3:
         return table
     one_way = not table.reciprocal and asymmetry(table) > ONE_WAY

@@ -1,4 +1,4 @@
-"""Compression of measurement files, with the resulting error: `gonio compress`."""
+"""Compress measurement files and report the resulting error: `gonio compress`."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ LEAST = 1024
 class Compressed:
     """A compressed material.
 
-    path     the file, followed by the material's name if it holds several
-    kind     kind of the table in it
+    path     the file, followed by the name of the material if the file contains several
+    kind     kind of the table in the file
     method   compression method
-    size     bytes per material: the mean, for a file with several
-    before   bytes of the original numbers
-    error    E |new - old| / E |old| of f cos, as reported by `gonio convert`
-    sphere   mean relative error of a sphere's pixels under a lamp and a sky
-    seconds  computing time per material
+    size     bytes per material; the mean if the file contains several
+    before   size of the original values in bytes
+    error    relative error of f cos theta_i, E |new - old| / E |old|, as reported by `gonio convert`
+    sphere   mean relative error of the pixels of a sphere under a lamp and a sky
+    seconds  computing time per material, s
     """
 
     path: str
@@ -55,12 +55,14 @@ def compress(
     codec: str = "log",
     bytes: int = SIZE,
 ) -> list[Compressed]:
-    """Compress measured materials into a `.gonio` file; the errors are measured on the written file.
+    """Compress measured materials into a `.gonio` file, and measure the errors of the written file.
 
-    source  a file or several, as `go.Measured` takes them; several make one file, whose materials are OUT.gonio:NAME
+    source  one file or several, as for `go.Measured`. Several files are written to one file, whose materials are named
+            OUT.gonio:NAME
+    output  the file to write
     codec   log (quantized logarithms), lowrank (shared factors), rgl (without `vndf`), network (675 weights)
-    bytes   size per material, for log and lowrank
-    Raises InputError if a file cannot be read, or if the codec cannot be used for it.
+    bytes   size per material, for the codecs log and lowrank
+    Raises InputError if a file cannot be read, or if the codec cannot be applied to it.
     """
     one = Method.family.get(codec, "codec")
     if not isinstance(bytes, int) or bytes < LEAST:

@@ -19,8 +19,8 @@ from ..tables.low_rank import LowRank
 from ..tables.rebuilt import Rebuilt, rebuilding
 from .base import Method, over_half_vectors
 
-OFFSET = 0.05  # fraction of the median of f: darker cells are measured with lower relative accuracy
-FILLS, FILL_STEP = 6, 2.0  # rounds of filling, and the step of the cosine coefficients meanwhile
+OFFSET = 0.05  # fraction of the median of f: the measurement of darker cells has a lower relative accuracy
+FILLS, FILL_STEP = 6, 2.0  # rounds of filling, and the step of the cosine coefficients during these rounds
 STEPS = (1e-3, 300.0)  # the range in which the step is searched
 HALVINGS = 9
 
@@ -30,7 +30,7 @@ C = TypeVar("C", LogTable, LowRank, LogAdaptive)
 
 
 class Log(Method):
-    """log: logarithms as cosine coefficients, each rounded to a multiple of a step, as fine as the size allows."""
+    """log: cosine coefficients of the logarithms, rounded to multiples of the smallest step that the size allows."""
 
     name: ClassVar[str] = "log"
 
@@ -46,7 +46,7 @@ class Log(Method):
 
 
 def _adaptive(table: Adaptive, size: int) -> Measurement:
-    """The table in adaptive form; on another grid its lobes would be lost."""
+    """A compressed adaptive table. Its grid is preserved, because another grid would lose the lobes."""
     offset = float(np.float32(OFFSET * max(float(np.median(np.abs(table.values))), 1e-9)))
     numbers = to_cosines(log_values(table.values, offset))
     arrays = Rebuilt({**table.arrays(), **rebuilding(table)}).arrays()
@@ -56,7 +56,7 @@ def _adaptive(table: Adaptive, size: int) -> Measurement:
 
 
 class Logs:
-    """A table's logarithms, filled smoothly at invalid cells, as brightness and two color differences."""
+    """The logarithms of a table as brightness and two color differences; invalid cells are filled smoothly."""
 
     def __init__(self, table: HalfDifference) -> None:
         self.table = table
@@ -67,7 +67,7 @@ class Logs:
         held = table._held(rgb) if not table.valid.all() else rgb
         self.values = np.log(np.maximum(held, 0.0) + self.offset) @ COLOURS.T
         if not table.valid.all():
-            # filling the invalid cells with a coarse cosine series needs the fewest bytes
+            # a coarse cosine series in the invalid cells takes the fewest bytes
             for _ in range(FILLS):
                 coarse = from_cosines(np.round(to_cosines(self.values) / FILL_STEP) * FILL_STEP)
                 self.values[~table.valid] = coarse[~table.valid]
@@ -82,9 +82,10 @@ class Logs:
 
 
 def coded(cls: type[T], logs: Logs, numbers: Floats, more: Stored, size: int, shared: int = 0) -> T:
-    """A half-difference table from its coefficients, in a file of about `size` bytes.
+    """A half-difference table from its coefficients, which are rounded so that its file has about `size` bytes.
 
-    more    further arrays of the table; `shared` of their bytes are not counted
+    more    further arrays of the table
+    shared  bytes of these arrays that do not count toward `size`
     """
     return rounded(cls, logs.table, numbers, {**logs.stored, **more}, (logs.table.turn, logs.offset), size, shared)
 
@@ -96,8 +97,9 @@ def rounded(
     """A table whose coefficients are rounded as finely as a file of `size` bytes allows.
 
     numbers  the coefficients
-    stored   the table's other arrays; `shared` of their bytes are not counted
-    scale    turn and offset, between which the step is inserted
+    stored   the other arrays of the table
+    scale    turn and offset; the step is inserted between them
+    shared   bytes of the other arrays that do not count toward `size`
     """
     own = Own()
     about = {"title": source.title, "source": source.source}
@@ -118,8 +120,10 @@ def rounded(
 
 
 def least(fits: Callable[[float], bool], low: float, high: float) -> float | None:
-    """Approximately the smallest number in [low, high] for which `fits` holds, provided that it then holds for all
-    larger numbers; None if it holds for none."""
+    """Approximately the smallest number in [low, high] for which `fits` is true; None if it is true for none.
+
+    `fits` must be true for all larger numbers too.
+    """
     if not fits(high):
         return None
     low, high = np.log(low), np.log(high)

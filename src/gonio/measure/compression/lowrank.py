@@ -1,4 +1,4 @@
-"""Factors of low rank, shared by several materials."""
+"""Low-rank factorizations that several materials share."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..tables.low_rank import BASES, LowRank, projected
 from .base import Method, over_half_vectors
 from .log import Logs, coded
 
-RANKS = (3, 4, 6, 9, 13, 18, 24, 32, 44)  # candidates, equal along all axes
+RANKS = (3, 4, 6, 9, 13, 18, 24, 32, 44)  # candidate ranks, which are equal along all axes
 
 
 class Lowrank(Method):
-    """lowrank: bases of the slices along each axis, from singular vectors of all materials together, and a core."""
+    """lowrank: a core and one basis per axis, computed from the singular vectors of all materials together."""
 
     name: ClassVar[str] = "lowrank"
     shared: ClassVar[bool] = True
@@ -57,7 +57,7 @@ class Lowrank(Method):
 
 
 def _vectors(every: list[Floats], axis: int) -> Floats:
-    """The singular vectors of the slices along an axis, of all materials together, largest first."""
+    """The singular vectors of the slices of all materials along an axis, by decreasing singular value."""
     count = every[0].shape[axis]
     gram = np.zeros((count, count))
     for logs in every:

@@ -18,7 +18,7 @@ from .base import Method, over_half_vectors
 
 Floats32 = NDArray[np.float32]
 
-OFFSET = 0.3  # fraction of the median of f: separates absolute from relative differences
+OFFSET = 0.3  # fraction of the median of f: differences are absolute below and relative above
 LOWEST = 0.01  # minimum cosine of both directions in training: within 0.6 degrees of the horizon
 STEPS, BATCH, RATE = 9000, 2048, 1e-2  # for Adam; the rate decreases linearly to 0
 ROUNDS, PAIRS = 40, 5000  # for Gauss-Newton, with as many pairs each
@@ -26,7 +26,7 @@ LARGEST = 60.0  # largest log(1 + f), within the range of exp in float32
 
 
 class NetworkMethod(Method):
-    """network: 675 weights per material, 6 -> 21 -> 21 -> 3 (Sztrajman2021), trained here; of fixed size."""
+    """network: 675 weights of a neural network, 6 -> 21 -> 21 -> 3 (Sztrajman2021), trained on the table."""
 
     name: ClassVar[str] = "network"
 
@@ -35,10 +35,10 @@ class NetworkMethod(Method):
 
 
 def trained(table: Measurement, seed: int = 1) -> Network:
-    """The network of a table, trained in about half a minute: by Adam in Dr.Jit, then by Levenberg-Marquardt.
+    """A network that is trained on a table, first with Adam in Dr.Jit, then with Levenberg-Marquardt.
 
-    The loss is |log(f + c) - log(f' + c)|, where f' is the network's value, averaged over the cells of a
-    half-difference table; c is a fraction of the median.
+    The training takes about half a minute. The loss is the mean of |log(f + c) - log(f' + c)| over the cells of a
+    half-difference table, where f' is the value of the network and c is a fraction of the median of f.
 
     seed  seed of the initial weights and of the batches
     """
@@ -56,7 +56,7 @@ def trained(table: Measurement, seed: int = 1) -> Network:
 class Data:
     """The training data.
 
-    inputs  (6, N), half and difference vectors of pairs: hx, hy, hz, dx, dy, dz
+    inputs  (6, N), half and difference vectors of pairs of directions: hx, hy, hz, dx, dy, dz
     logs    (3, N), log(f + offset)
     """
 
@@ -72,7 +72,7 @@ class Data:
         phi_d = (np.arange(count) + 0.5) / count * table.turn
         h, d, p = (a.ravel() for a in np.meshgrid(theta_h, theta_d, phi_d, indexing="ij"))
         along, side = np.sin(d) * np.cos(p), np.sin(d) * np.sin(p)
-        flip = np.where(side < 0.0, -1.0, 1.0)  # a full turn is reduced to one half: swapping wo and wi changes nothing
+        flip = np.where(side < 0.0, -1.0, 1.0)  # reduces a full turn to half a turn, because f is reciprocal
         both = np.stack([np.sin(h), 0.0 * h, np.cos(h), along * flip, side * flip, np.cos(d)]).astype(np.float32)
         lowest = np.cos(d) * np.cos(h) - np.abs(np.sin(h) * along)
         usable = table.valid.ravel() & (lowest > LOWEST)
@@ -85,7 +85,7 @@ Weights = dict[str, Floats32]
 
 
 def _started(data: Data, rng: np.random.Generator) -> Weights:
-    """Random initial weights (Glorot2010), and the median color."""
+    """Random initial weights (Glorot2010); the output biases give the median color."""
     weights: Weights = {}
     for name, shape in SHAPES.items():
         if name.startswith("kernel"):
@@ -99,7 +99,7 @@ def _started(data: Data, rng: np.random.Generator) -> Weights:
 
 
 def _descended(weights: Weights, data: Data, rng: np.random.Generator) -> Weights:
-    """The weights after Adam, on batches of pairs."""
+    """The weights after training with Adam on batches of pairs."""
     dr, types = backend.drjit(), backend.types("float32")
     Tensor = types.module.TensorXf
     opt = importlib.import_module("drjit.opt").Adam(lr=RATE, params={n: Tensor(w) for n, w in weights.items()})
@@ -125,7 +125,7 @@ def _descended(weights: Weights, data: Data, rng: np.random.Generator) -> Weight
 
 
 def _refined(weights: Weights, data: Data, rng: np.random.Generator) -> Weights:
-    """The weights after Levenberg-Marquardt on the squares: with 675 weights, the normal equations are small."""
+    """The weights after Levenberg-Marquardt iterations; for 675 weights, the normal equations are small."""
     damping = 1e-2
     for _ in range(ROUNDS):
         pick = rng.choice(data.inputs.shape[1], min(PAIRS, data.inputs.shape[1]), replace=False)
@@ -153,7 +153,7 @@ def _units(weights: Weights, inputs: Floats32) -> tuple[Floats32, Floats32, Floa
 
 
 def _differences(weights: Weights, data: Data) -> tuple[Floats32, Floats32]:
-    """Differences of the logarithms, (3, N), and their derivatives with respect to the network's outputs."""
+    """The differences of the logarithms, (3, N), and their derivatives with respect to the outputs of the network."""
     said = _units(weights, data.inputs)[2]
     f = np.expm1(said)
     lit = f > 0.0
@@ -162,7 +162,10 @@ def _differences(weights: Weights, data: Data) -> tuple[Floats32, Floats32]:
 
 
 def _normal_equations(weights: Weights, data: Data) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """J J^T, J r and the mean of r^2, with r the differences: explicit back-propagation for each channel."""
+    """J J^T, J r and the mean of r^2, where r are the differences and J their Jacobian matrix.
+
+    J is computed by explicit backpropagation for each channel.
+    """
     first, second, _ = _units(weights, data.inputs)
     rest, derivative = _differences(weights, data)
     sizes = [weights[name].size for name in SHAPES]

@@ -1,4 +1,4 @@
-"""RGL tables without redundant arrays."""
+"""RGL tables stored without their redundant arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .base import Method
 
 
 class Rgl(Method):
-    """rgl: an adaptive table without `vndf`, which is rebuilt from the distribution of normals; of a fixed size."""
+    """rgl: an adaptive table without `vndf`, which is computed from the distribution of normals; its size is fixed."""
 
     name: ClassVar[str] = "rgl"
 

@@ -1,1 +1,1 @@
-"""Files of measured materials, one format per file in this folder; to add one, add a file."""
+"""File formats of measured materials. Each file in this folder defines one format."""

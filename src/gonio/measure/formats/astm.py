@@ -1,4 +1,4 @@
-"""ASTM E1392 text files: a list of angles and values, the common format of scatterometers."""
+"""ASTM E1392 text files: lists of angles and values, the common format of scatterometers."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ ANGLES = ["theta_i", "phi_i", "theta_s", "phi_s"]
 
 
 class Astm(Format):
-    """ASTM E1392: a header of keywords, ended by VARS, then rows of comma-separated numbers.
+    """ASTM E1392: a header of keywords, of which VARS is the last, then rows of comma-separated numbers.
 
-    As published, NUM_POINTS, if present, is the number of rows; VARS names the columns, four angles in radians
-    (theta_i, phi_i, theta_s, phi_s) and a value each for red, green and blue (R, G, B), one channel, or wavelengths
+    NUM_POINTS, if present, is the number of rows. VARS names the columns: four angles in radians (theta_i, phi_i,
+    theta_s, phi_s), then the values: red, green and blue (R, G, B), a single channel, or one value per wavelength
     ("550nm"). Rows that form a complete grid over (theta_i, theta_s, |phi|) are read as a grid.
     """
 
@@ -61,7 +61,7 @@ class Astm(Format):
         source = {"format": self.name, **head}
         values[:, [0, 2]] = np.abs(values[:, [0, 2]])
         title = head.get("TITLE", "")
-        title = "" if title == "-" else title  # written for tables without a title
+        title = "" if title == "-" else title  # "-" is written for tables without a title
         grid = _grid(values, where, title, source, nm)
         return grid or Samples(values[:, :4], values[:, 4:], where, title, source, nm)
 
@@ -81,7 +81,7 @@ class Astm(Format):
         return (head + written(np.concatenate([directions, values], axis=1), ",")).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """Samples and grids are unchanged; other tables are evaluated at the directions of a goniometer's plan."""
+        """Return samples and grids unchanged; evaluate other tables at the directions of `samples.plan`."""
         if isinstance(source, Samples | Angles):
             return source
         return sampled(source.rgb, title=source.title, source=source.source)
@@ -92,7 +92,7 @@ def _plain(name: str) -> str:
 
 
 def _wavelengths(names: list[str], where: str) -> Floats | None:
-    """The wavelengths of columns named "550nm"; None if there are none."""
+    """The wavelengths in column names such as "550nm"; None if there are none."""
     matches = [re.fullmatch(r"([0-9.eE+]+) *nm", name.strip()) for name in names]
     if not any(matches):
         return None
@@ -106,7 +106,7 @@ def _wavelengths(names: list[str], where: str) -> Floats | None:
 
 
 def _grid(rows: Floats, where: str, title: str, source: dict[str, str], nm: Floats | None) -> Angles | None:
-    """The rows as a table, if they are a complete grid with |phi| from 0 to pi."""
+    """The rows as a table if they form a complete grid with |phi| from 0 to pi; otherwise None."""
     between = np.abs((rows[:, 3] - rows[:, 1] + np.pi) % (2.0 * np.pi) - np.pi)
     axes = [np.unique(column) for column in (rows[:, 0], rows[:, 2], between)]
     count = np.prod([len(nodes) for nodes in axes])

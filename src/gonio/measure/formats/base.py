@@ -1,7 +1,7 @@
-"""The interface of a format: how its files are recognized, read and written.
+"""The interface of file formats: how files are recognized, read and written.
 
-A reader is strict: it accepts a file completely or rejects it with one error, and before it allocates memory it checks
-the claimed sizes against the file's size.
+Readers are strict: a file is either accepted completely or rejected with one error. Before a reader allocates memory,
+it checks the sizes stated in the file against the size of the file.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ class Format:
     """A file format.
 
     name      printed by `gonio info`
-    suffixes  suffixes by which files are recognized; the first is used for writing
-    writes    the kind of table that `write` accepts, by name; "" if the format cannot be written
+    suffixes  suffixes by which files are recognized; written files have the first of them
+    writes    name of the kind of table that `write` accepts; "" if the format cannot be written
     """
 
     family: ClassVar[Family[Format]]
@@ -29,31 +29,34 @@ class Format:
     suffixes: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[str] = ""
     several: ClassVar[bool] = False  # whether a file holds several materials
-    common: ClassVar[bool] = False  # whether other files often have its suffix: a folder's are not measurements
+    # whether other files often have this suffix; in a folder, such files do not count as measurements
+    common: ClassVar[bool] = False
 
     def fits(self, data: bytes) -> bool:
-        """Whether a file's contents are in this format; called if several formats share the file's suffix."""
+        """Whether the contents of a file are in this format; called if several formats share its suffix."""
         return True
 
     def read(self, data: bytes, where: str, item: str = "") -> Measurement:
-        """The table in a file's bytes. Raises InputError if they are in another format.
+        """Read a table from the bytes of a file. Raises InputError if they are not in this format.
 
-        where  name of the file, for errors
-        item   the material, in files that hold several
+        where  name of the file in errors
+        item   name of the material, if the file contains several
         """
         raise NotImplementedError
 
     def write(self, table: Measurement) -> bytes:
-        """The contents of a file, as bytes, for a table of the kind that `writes` names."""
+        """The bytes of a file with a table, whose kind must be the one that `writes` names."""
         raise InputError(f"{self.name} files cannot be written", "OUT", "choose another suffix")
 
     def resampled(self, source: Measurement) -> Measurement:
-        """The table converted to the kind that `writes` names; unchanged if it is already of that kind."""
+        """Convert a table to the kind that `writes` names; a table of this kind is returned unchanged."""
         raise NotImplementedError
 
     def items(self, data: bytes, where: str) -> list[str]:
-        """The names of the materials in a file that holds several; empty for other files. `where` names the file in
-        errors."""
+        """The names of the materials in a file that contains several; empty for other files.
+
+        where  name of the file in errors
+        """
         return []
 
 
@@ -61,16 +64,16 @@ Format.family = Family("format", "gonio.formats", ["gonio.measure.formats"], ins
 
 
 def by_suffix(path: str | Path) -> list[Format]:
-    """The formats with a file's suffix; those whose first suffix it is come first."""
+    """The formats that use the suffix of a file. Formats that write this suffix come first."""
     suffix = Path(path).suffix.lower()
     formats = [one for one in Format.family.all().values() if suffix and suffix in one.suffixes]
     return sorted(formats, key=lambda one: one.suffixes.index(suffix))
 
 
 def contents(path: Path, where: str = "") -> bytes:
-    """A file's bytes. Raises InputError if it cannot be read, or is larger than any table can be.
+    """The bytes of a file. Raises InputError if it cannot be read, or is larger than any table can be.
 
-    where  name of the file in errors; "": its path
+    where  name of the file in errors; if empty, its path
     """
     try:
         size = path.stat().st_size

@@ -1,4 +1,4 @@
-"""Cornell's text files of gonioreflectometer measurements, as shipped with pbrt-v2."""
+"""Cornell's text format for gonioreflectometer measurements, as shipped with pbrt-v2."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .base import Format
 from .text import lines, numbers, written
 
 HEADINGS = ("written by Gonio", "num wls", "wls", "theta i")  # comments that do not describe the material
-WAVELENGTHS = np.arange(400.0, 701.0, 10.0)  # nm, of the Cornell paints; used to write colors
+WAVELENGTHS = np.arange(400.0, 701.0, 10.0)  # wavelengths of the Cornell paints, nm; colors are written at these
 
 
 class Cornell(Format):
-    """Cornell text: the number of wavelengths, the wavelengths [nm], then one sample per row.
+    """Cornell text: the number of wavelengths, the wavelengths in nm, then one sample per row.
 
-    A sample is theta_i, phi_i, theta_r, phi_r in radians and one value per wavelength. Lines that start with # are
-    comments, and the first of them is the title.
+    A sample consists of theta_i, phi_i, theta_r, phi_r in radians, and one value per wavelength. Lines that start with
+    # are comments, and the first comment is the title.
     """
 
     name: ClassVar[str] = "cornell"
@@ -64,7 +64,7 @@ class Cornell(Format):
     def write(self, table: Measurement) -> bytes:
         assert isinstance(table, Samples), "ensured by `resampled`"
         nm, values = table.wavelengths, table.values
-        if nm is None:  # three channels, or one: the smoothest spectra of these colors
+        if nm is None:  # for one or three channels, write the smoothest spectra of these colors
             nm = WAVELENGTHS
             values = np.repeat(values, 3, 1) if values.shape[1] == 1 else values
             values = values @ colours.to_spectrum(nm)
@@ -74,7 +74,7 @@ class Cornell(Format):
         return (head + written(np.concatenate([table.directions, values], axis=1))).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """Samples are unchanged; other tables are evaluated at the directions of a goniometer's plan."""
+        """Return samples unchanged; evaluate other tables at the directions of `samples.plan`."""
         if isinstance(source, Samples):
             return source
         return sampled(source.rgb, title=source.title, source=source.source)

@@ -1,4 +1,4 @@
-"""MERL's `.binary`: the table of Matusik2003, and its variant with a full turn of phi_d."""
+"""MERL's `.binary` format: the table of Matusik2003, and a variant in which phi_d covers a full turn."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from ..tables.base import Measurement, in_rgb
 from ..tables.half_difference import HalfDifference, sampled
 from .base import Format
 
-SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0  # of red, green and blue
+SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0  # factors of red, green and blue
 CELLS = (90, 90)
 
 
 class Merl(Format):
-    """MERL BRDF: three int32, then red, green and blue planes of float64 over (theta_h, theta_d, phi_d).
+    """MERL BRDF: three int32 numbers, then red, green and blue planes of float64 over (theta_h, theta_d, phi_d).
 
-    90 x 90 x 180 cells over half a turn of phi_d, or 90 x 90 x 360 over a full turn. Values are f times 1500,
-    1500 / 1.15 and 1500 / 1.66; a negative one marks an invalid cell.
+    A file has 90 x 90 x 180 cells if phi_d covers half a turn, or 90 x 90 x 360 cells if it covers a full turn. The
+    values are f times 1500 for red, 1500 / 1.15 for green and 1500 / 1.66 for blue; a negative value marks an invalid
+    cell.
     """
 
     name: ClassVar[str] = "merl"
@@ -54,10 +55,10 @@ class Merl(Format):
         return struct.pack("<3i", *table.values.shape[:3]) + np.moveaxis(values, -1, 0).astype("<f8").tobytes()
 
     def resampled(self, source: Measurement, phi: int | None = None) -> Measurement:
-        """The table itself if it has MERL's cells; else the values at the center of each cell.
+        """The table itself if it has the cells of a MERL file; otherwise, a table evaluated at the centers of these.
 
-        phi  cells of phi_d: 180 for half a turn, or 360 for a full turn, which preserves nonreciprocal values; None for
-             as many as the table has, else 180
+        phi  number of cells along phi_d: 180 for half a turn, or 360 for a full turn, which preserves nonreciprocal
+             values; None uses the number in the table if this is valid, and 180 otherwise
         """
         if isinstance(source, HalfDifference) and source.values.shape[:3] in ((*CELLS, 180), (*CELLS, 360)):
             cells = source.values.shape[2]

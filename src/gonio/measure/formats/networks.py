@@ -1,4 +1,4 @@
-"""Small networks that represent materials of the MERL database (Sztrajman2021)."""
+"""Small neural networks that represent materials of the MERL database (Sztrajman2021)."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ CELLS = (90, 90, 180)
 
 
 class Networks(Format):
-    """Networks of 675 weights (Sztrajman2021): half and difference vector -> 21 -> 21 -> exp(x) - 1 = RGB of f.
+    """Neural networks of 675 weights (Sztrajman2021): half and difference vector -> 21 -> 21 -> exp(x) - 1 = RGB of f.
 
-    A .npz file holds NAME/kernel0 to 2 and NAME/bias0 to 2 of several materials; FILE.npz:NAME selects one. It is read
-    as a half-difference table of MERL's size with the network's values; values below the horizon are extrapolations
-    and marked invalid.
+    A .npz file contains the arrays NAME/kernel0 to 2 and NAME/bias0 to 2 of one or more materials; FILE.npz:NAME
+    selects one of these. The network is evaluated at the cells of a half-difference table of MERL's size. Its values
+    below the horizon are extrapolations, so these cells are marked invalid.
     """
 
     name: ClassVar[str] = "networks"
@@ -63,10 +63,10 @@ class Networks(Format):
 
 
 def tabulated(weights: dict[str, NDArray[np.float32]]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """A network's values at the centers of MERL's cells, (90, 90, 180, 3), and which of them lie above the surface.
+    """The values of a network at the centers of MERL's cells, (90, 90, 180, 3), and a mask of those above the surface.
 
-    A cell's half vector is (sin theta_h, 0, cos theta_h), its difference vector is the light's direction in the frame
-    of the half vector.
+    The half vector of a cell is (sin theta_h, 0, cos theta_h), and its difference vector is the direction of the light
+    in the frame of the half vector.
     """
     n, m, count = CELLS
     theta_h = ((np.arange(n) + 0.5) / n) ** 2 * (0.5 * np.pi)

@@ -1,4 +1,4 @@
-"""Untrusted arrays in a zip file (NumPy's .npz): every claim of a header is checked before use."""
+"""Read untrusted NumPy .npz files: everything that a header states is checked before it is used."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ...errors import InputError
 
 MEMBERS = 4096
 HEADER = 4096  # maximum length of an array's header
-LARGEST = 1 << 28  # bytes of all arrays together if they are compressed: deflate reduces zeros by a factor of 1000
+LARGEST = 1 << 28  # maximum total size of compressed arrays in bytes: DEFLATE compresses zeros by a factor of 1000
 
 
 def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
     """The arrays in a file, by name.
 
-    where  name of the file, for errors
-    Raises InputError if the file is not a zip file, is damaged, or holds objects (pickles).
+    where  name of the file in errors
+    Raises InputError if the file is not a zip file, is damaged, or contains pickled objects.
     """
     if data[-22:-18] != b"PK\5\6":  # the end of an archive without a comment
         raise InputError("it does not end like a .npz file", where, "the file is truncated, longer, or not a .npz")
@@ -52,7 +52,7 @@ def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
             return entries
     except InputError:
         raise
-    except Exception as error:  # zipfile and zlib raise their own types for damaged content
+    except Exception as error:  # for damaged content, zipfile and zlib raise exceptions of their own types
         what = f"no arrays can be read from it: {type(error).__name__}: {str(error)[:120]}"
         raise InputError(what, where, "the file is damaged, or not a .npz") from None
 
@@ -86,7 +86,7 @@ def _array(content: bytes, name: str, where: str) -> NDArray[np.generic]:
 
 
 def written(parts: Mapping[str, NDArray[np.generic]]) -> bytes:
-    """The bytes of an uncompressed file of arrays; equal content gives equal bytes."""
+    """The bytes of an uncompressed .npz file with the given arrays. Equal arrays give identical bytes."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as file:
         for name, array in parts.items():

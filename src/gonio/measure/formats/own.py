@@ -1,4 +1,4 @@
-"""Gonio's own tables, `.gonio`: any kind of table, with its axes and units."""
+"""Gonio's own format, `.gonio`, for any kind of table, with axes and units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .base import Format
 from .npz import arrays, written
 
 VERSION = 1  # version of a file with one material
-SEVERAL = 2  # version of a file with several
+SEVERAL = 2  # version of a file with several materials
 MANIFEST = "manifest"
 BESIDE = ("error", "first")  # keys of `Measurement.beside`
 
@@ -23,14 +23,14 @@ Arrays = Mapping[str, NDArray[np.generic]]
 
 
 class Own(Format):
-    """Gonio table: a .npz of plain arrays and a manifest in JSON (version, kind, title, source, axes with units).
+    """Gonio table: a .npz file of plain arrays and a JSON manifest (version, kind, title, source, axes with units).
 
-    Values are f in 1/sr (in adaptive tables as in the RGL format), angles are radians, wavelengths nm. No array is
-    compressed and nothing is pickled. Every kind of table is stored unchanged, with the standard error of each value
-    (`error`) and its single-bounce part (`first`) if an instrument measured them.
+    Values are f in 1/sr (those of adaptive tables are as in the RGL format), angles are in radians, wavelengths in nm.
+    Arrays are neither compressed nor pickled. Every kind of table is stored unchanged. If an instrument measured them,
+    the file also contains the standard error of each value (`error`) and its single-bounce part (`first`).
 
-    A file of version 2 holds several materials: its manifest contains that of each under its name, their arrays are
-    NAME/ARRAY, and arrays without a name belong to all.
+    A file of version 2 contains several materials. Its manifest contains the manifest of each material under its name.
+    Arrays of one material are called NAME/ARRAY; all other arrays are shared by all materials.
     """
 
     name: ClassVar[str] = "gonio"
@@ -83,7 +83,7 @@ class Own(Format):
         return table
 
     def _parts(self, data: bytes, where: str) -> tuple[dict[str, NDArray[np.generic]], dict[str, Any]]:
-        """The arrays and, for a file with several materials, the manifest of each."""
+        """The arrays, and the manifest of each material if the file contains several."""
         parts = arrays(data, where)
         manifest = self._manifest(parts, where)
         if manifest["version"] != SEVERAL:
@@ -111,13 +111,13 @@ class Own(Format):
         return self.file_of(type(table), {**table.arrays(), **extra}, about)
 
     def file_of(self, kind: type[Measurement], parts: Arrays, about: Mapping[str, Any]) -> bytes:
-        """The file of a table of a kind, from its arrays and metadata: title, source, wavelengths."""
+        """The bytes of a file with a table of a given kind, from arrays and metadata (title, source, wavelengths)."""
         nm = about.get("wavelengths")
         more = {} if nm is None else {"wavelengths": nm}
         return written({MANIFEST: _text({"version": VERSION, **_about(kind, about)}), **parts, **more})
 
     def write_several(self, tables: Mapping[str, Measurement]) -> bytes:
-        """The file of several tables, by name; arrays shared by all are stored once."""
+        """The bytes of a file with several tables, by name. Arrays that all of them share are stored once."""
         manifests = {
             name: _about(type(table), {"title": table.title, "source": table.source}) for name, table in tables.items()
         }

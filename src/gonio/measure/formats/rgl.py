@@ -19,15 +19,16 @@ MAGIC = b"tensor_file\0"
 TYPES = {
     1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8: "<i8", 9: "<f2", 10: "<f4", 11: "<f8",
 }  # fmt: skip
-ALIGNED = 8  # bytes: fields start at multiples of this, and a file may end with so much padding
-FIELDS, NAME, RANK = 64, 256, 8  # limits for plausible files
+ALIGNED = 8  # bytes: fields start at multiples of this, and a file may end with padding of up to this size
+FIELDS, NAME, RANK = 64, 256, 8  # limits of plausible files: fields, characters of a name, axes of a field
 
 
 class Rgl(Format):
     """RGL BSDF: a tensor file (`tensor_file`, version 1.0) of Dupuy2018, RGB or spectral.
 
-    A field is a u16 length and the name, u16 number of axes, u8 type, u64 offset, and a u64 per axis. Required fields
-    are phi_i, theta_i, ndf, sigma, vndf, luminance, and rgb or wavelengths with spectra; other fields are ignored.
+    A field is described by the length of its name (u16), the name, the number of axes (u16), the type (u8), the offset
+    (u64) and the size of each axis (u64). The required fields are phi_i, theta_i, ndf, sigma, vndf and luminance, and
+    either rgb or wavelengths and spectra. Other fields are ignored.
     """
 
     name: ClassVar[str] = "rgl"
@@ -80,14 +81,14 @@ class Rgl(Format):
         })  # fmt: skip
 
     def resampled(self, source: Measurement) -> Measurement:
-        """The table itself if it is adaptive; else one with a warp computed for it (`tables.adapted`)."""
+        """The table itself if it is adaptive; otherwise, an adaptive table computed from it (`tables.adapted`)."""
         return source if isinstance(source, Adaptive) else adapted(source)
 
 
 def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
-    """The fields of a tensor file, as views into its bytes: nothing is allocated beyond the file's size.
+    """The fields of a tensor file, as views into its bytes, so no further memory is allocated.
 
-    where  name of the file, for errors
+    where  name of the file in errors
     """
     place = len(MAGIC)
 

@@ -1,13 +1,13 @@
-"""Text files with rows of directions and values of f, as any program can write them.
+"""Text files with rows of directions and values of f, which any program can write.
 
     # up: y
     wo.x, wo.y, wo.z, wi.x, wi.y, wi.z, f
     0.36, -0.48, 0.8, 0.0, 0.6, 0.8, 0.1507
 
 Commas, semicolons, tabs or spaces separate the numbers; empty lines and lines that start with # are skipped. Each row
-has wo, wi and one or three values of f. A first line without numbers may name the columns. Names of angles, which are
-theta_i, phi_i, theta_o and phi_o (or theta_r, theta_s) in any order, replace the directions by angles in degrees. Five
-columns without names are theta_o, phi_o, theta_i, phi_i and f.
+consists of wo, wi and one or three values of f. The first line may name the columns. If the columns are named theta_i,
+phi_i, theta_o and phi_o (or theta_r, theta_s), in any order, the directions are angles in degrees. Five columns without
+names are theta_o, phi_o, theta_i, phi_i and f.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from ..tables.samples import UNIT, Samples, sampled
 from . import text
 from .base import Format
 
-RADIANS = 1.6  # largest theta, and a quarter of the largest phi, of a file whose angles are probably in radians
+RADIANS = 1.6  # if no theta exceeds this, and no phi four times this, the angles are probably in radians
 ANGLES = ("theta_o", "phi_o", "theta_i", "phi_i")
-WIDTHS = {5: 4, 7: 6, 9: 6}  # columns of a file without names -> columns of its directions
+WIDTHS = {5: 4, 7: 6, 9: 6}  # number of columns in a file without column names -> number of columns of its directions
 HINT = "7 columns are wo, wi and f; 9 have f in three channels; 5 are theta_o, phi_o, theta_i, phi_i, f in degrees"
-UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that become x, y and z, as rotations
+UP = {"z": [0, 1, 2], "y": [2, 0, 1], "x": [1, 2, 0]}  # the axes that are rotated to x, y and z
 _COMMENT = re.compile(r"^\s*(?:#|//)\s*(\w+)\s*:\s*(.+?)\s*$")
 
 
 class Pairs(NamedTuple):
-    """Directions (N, 3) with z up, values of f (N, 1 or 3), and the line number of each row."""
+    """Directions (N, 3) with z up, values of f (N, 1) or (N, 3), and the line number of each row."""
 
     wo: Floats
     wi: Floats
@@ -42,9 +42,9 @@ class Pairs(NamedTuple):
 
 
 def parsed(data: bytes, where: str, up: str = "z") -> Pairs:
-    """The rows of a file, converted from the axis `up` to z up.
+    """Read the rows of a file, and rotate the directions so that the axis `up` becomes z.
 
-    where  name of the file, for errors
+    where  name of the file in errors
     Raises InputError, which names the line, for damaged files.
     """
     names, table = _split(text.lines(data, where))
@@ -71,13 +71,13 @@ def parsed(data: bytes, where: str, up: str = "z") -> Pairs:
 
 
 def comments(data: bytes) -> dict[str, str]:
-    """The entries of comments such as `# up: y`, by key."""
+    """The key-value pairs in comments such as `# up: y`."""
     matches = (_COMMENT.match(line) for line in data.decode("utf-8-sig", "replace").splitlines())
     return {match[1]: match[2] for match in matches if match}
 
 
 def _split(lines: list[str]) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The names of the columns, if any, and the line number and words of each row; comments are skipped."""
+    """The names of the columns, if present, and the line number and words of each row; comments are skipped."""
     names: list[str] = []
     table: list[tuple[int, list[str]]] = []
     for number, line in enumerate(lines, 1):
@@ -92,7 +92,7 @@ def _split(lines: list[str]) -> tuple[list[str], list[tuple[int, list[str]]]]:
 
 
 def _angles(names: list[str], where: str) -> list[str]:
-    """The order of the four angles, if the columns are named and begin with angles; else []."""
+    """The names of the four angles in the order of the columns; [] if the columns are not named or not angles."""
     if not any(name.startswith("theta") for name in names):
         return []
     given = [re.sub(r"_[rsv]\b", "_o", name) for name in names[:4]]
@@ -111,7 +111,7 @@ def _is_number(word: str) -> bool:
 
 
 def _at(theta: Floats, phi: Floats) -> Floats:
-    """Unit vectors at angles in degrees, (N, 3)."""
+    """The unit vectors at angles in degrees, (N, 3)."""
     return spherical_array(np.sin(np.radians(theta)), np.cos(np.radians(theta)), np.radians(phi))
 
 
@@ -126,7 +126,7 @@ def _directions(w: Floats, name: str, lines: list[int], where: str) -> Floats:
 
 
 class Rows(Format):
-    """Rows of wo, wi and f, as above, with z up unless a comment such as `# up: y` names another axis."""
+    """Rows of wo, wi and f, where z points up unless a comment such as `# up: y` names another axis."""
 
     name: ClassVar[str] = "rows"
     suffixes: ClassVar[tuple[str, ...]] = (".csv",)
@@ -156,8 +156,7 @@ class Rows(Format):
         return (head + text.written(np.concatenate([*table.pairs(), f], axis=1), ",")).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """Samples in RGB are unchanged; spectra become RGB, and other tables are evaluated at the directions of a
-        goniometer's plan."""
+        """Return RGB samples unchanged, convert spectral samples to RGB, evaluate other tables at `samples.plan`."""
         if not isinstance(source, Samples):
             return sampled(source.rgb, title=source.title, source=source.source)
         if source.wavelengths is None and source.values.shape[1] == 3:

@@ -13,13 +13,13 @@ LONGEST = 1 << 20  # characters of a line
 
 
 def lines(data: bytes, where: str) -> list[str]:
-    """The lines of a text file, without line ends. Raises InputError, which names `where`, if it is not text."""
+    """The lines of a text file, without line breaks. Raises InputError, which names `where`, if it is not text."""
     if b"\0" in data:
         raise InputError("not a text file: it contains zero bytes", where)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")  # comments may use an older encoding; numbers are the same
+        text = data.decode("latin-1")  # comments may use an older encoding, which does not affect the numbers
     rows = text.splitlines()
     if any(len(line) > LONGEST for line in rows):
         raise InputError(f"a line of more than {LONGEST} characters", where)
@@ -27,7 +27,7 @@ def lines(data: bytes, where: str) -> list[str]:
 
 
 def numbers(words: list[str], where: str, line: int) -> list[float]:
-    """Convert words to finite numbers. Raises InputError, which names file and line, if one is not."""
+    """Convert words to finite numbers. Raises InputError, which names file and line, if a word is not such a number."""
     values = []
     for word in words:
         try:
@@ -44,7 +44,7 @@ def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[
     """Convert rows of words to numbers, (N, width).
 
     rows   line number and words of each row
-    where  name of the file, for errors
+    where  name of the file in errors
     """
     for line, row in rows:
         if len(row) != width:
@@ -60,5 +60,5 @@ def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[
 
 
 def written(values: NDArray[np.float64], separator: str = " ") -> str:
-    """Rows of numbers as text, with all digits of float64."""
+    """Format rows of numbers as text, with enough digits to preserve float64 values exactly."""
     return "\n".join(separator.join(f"{x:.17g}" for x in row) for row in values) + "\n"

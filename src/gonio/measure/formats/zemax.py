@@ -1,4 +1,4 @@
-"""Zemax's tabular BSDF, the data interchange format of Radiant Imaging: text."""
+"""Zemax's tabular BSDF, a text format for data interchange by Radiant Imaging."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .text import lines, numbers, table, written
 
 AXES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
 BLOCKS = {"monochrome": ("Monochrome",), "xyz": ("TristimulusX", "TristimulusY", "TristimulusZ")}
-MOST = 100_000  # largest accepted number of nodes of an axis before they are counted
+MOST = 100_000  # maximum number of nodes that the header may state for an axis
 
 
 class _Lines:
@@ -29,14 +29,14 @@ class _Lines:
         return next(self._rows, None)
 
     def following(self, what: str) -> tuple[int, str]:
-        """The next line. Raises InputError at the end of the file, where `what` is expected."""
+        """The next line. Raises InputError, which states that `what` is expected, at the end of the file."""
         row = self.left()
         if row is None:
             raise InputError(f"the file ends where {what} is expected", self.where, "the file is truncated")
         return row
 
     def keyword(self, word: str, first_only: bool = True, hint: str = "") -> tuple[int, str]:
-        """The next line, which must be this keyword or begin with it."""
+        """The next line, which must begin with the given keyword."""
         number, line = self.following(f"'{word}'")
         if (line.split()[0] if first_only else line).lower() != word.lower():
             raise InputError(f"'{line[:40]}' where '{word}' is expected", f"{self.where}:{number}", hint)
@@ -44,7 +44,7 @@ class _Lines:
 
 
 def _head(rest: _Lines) -> tuple[dict[str, str], dict[str, Floats]]:
-    """The keywords and the axes, in radians."""
+    """Read the header: the keywords, and the axes in radians."""
     head: dict[str, str] = {}
     axes: dict[str, Floats] = {}
     where = rest.where
@@ -70,7 +70,7 @@ def _head(rest: _Lines) -> tuple[dict[str, str], dict[str, Floats]]:
 
 
 def _blocks(head: dict[str, str], axes: dict[str, Floats], where: str) -> tuple[str, ...]:
-    """The names of the blocks of values. Raises InputError for files of another kind."""
+    """The names of the blocks of values. Raises InputError for files that cannot be read, such as a BTDF."""
     for word in AXES:
         if word not in axes:
             raise InputError(f"no axis {word}", where)
@@ -99,12 +99,13 @@ def _channel(rest: _Lines, block: str, incidences: int, azimuths: int, radials: 
 
 
 class Zemax(Format):
-    """Zemax BSDF: a header of keywords with the axes in degrees, then a block of values for each channel.
+    """Zemax BSDF: a header with keywords and axes in degrees, then a block of values for each channel.
 
-    The view's angles are relative to the mirror direction: ScatterRadial from it, ScatterAzimuth around it, 0 toward
-    the normal. A block has, for each AngleOfIncidence, a line "TIS x" and a row of radial values for each azimuth,
-    1/sr. Only a BRDF of one SampleRotation, Monochrome or XYZ, is read; anisotropic samples (several rotations) and
-    BTDFs are rejected.
+    The view direction is relative to the mirror direction: ScatterRadial is the angle between the two, and
+    ScatterAzimuth is the azimuth about the mirror direction, 0 toward the normal. For each AngleOfIncidence, a block
+    contains a line "TIS x" and, for each azimuth, a row of values by radial angle, in 1/sr. Only BRDFs with one
+    SampleRotation and the spectral content Monochrome or XYZ are supported. Anisotropic samples, which have several
+    rotations, and BTDFs are rejected.
     """
 
     name: ClassVar[str] = "zemax"
@@ -153,12 +154,12 @@ class Zemax(Format):
         return "".join(parts).encode()
 
     def resampled(self, source: Measurement) -> Measurement:
-        """The table itself if it is about the mirror direction; else its values at the nodes of such a table."""
+        """The table itself if it is of kind `specular`; otherwise, its values at the nodes of such a table."""
         return source if isinstance(source, Specular) else sampled(source.rgb, title=source.title, source=source.source)
 
 
 def scattered(table: Specular) -> list[float]:
-    """The total integrated scatter of each angle of light, int f cos theta_r d omega_r, in luminance."""
+    """The total integrated scatter for each angle of incidence, int f cos theta_r d omega_r, in luminance."""
     rng = np.random.default_rng(1)
     u, v = (np.arange(4096) + 0.5) / 4096, rng.random(4096)
     wo = np.stack([np.sqrt(u) * np.cos(2 * np.pi * v), np.sqrt(u) * np.sin(2 * np.pi * v), np.sqrt(1.0 - u)], -1)

@@ -1,1 +1,1 @@
-"""Measured tables as stored, one file per kind. Each can be evaluated, sampled and written into a shader."""
+"""Kinds of measured tables, one file per kind. Each kind can be evaluated, sampled and written into a shader."""

@@ -1,4 +1,4 @@
-"""An adaptive table of any isotropic material: the warp of Dupuy2018, computed from values instead of measured."""
+"""Convert any isotropic table to an adaptive table: the warp of Dupuy2018 is computed from the values of the table."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from .. import colours
 from .adaptive import Adaptive
 from .base import Floats, Measurement
 
-VIEWS, NORMALS, PLACES = 16, 128, 48  # of theta_i; per side of the square of normals; per side of the square of values
+# number of viewing angles, of nodes per side of the square of normals, and of nodes per side of the square of values
+VIEWS, NORMALS, PLACES = 16, 128, 48
 
 
 def adapted(source: Measurement) -> Adaptive:
-    """An adaptive table of a measurement with rotational and mirror symmetry.
+    """Convert a table with rotational and mirror symmetry to an adaptive table.
 
-    D is derived from retroreflection, where half vector and direction coincide: f(w, w) = D F G / (4 cos^2), so that
-    D ~ f cos^2 up to masking (Dupuy2018, sec. 3.2, without its iteration: a warp works with any D, and its errors are
-    compensated by the values). sigma is its projected area, and vndf = D max(0, wo.m) / sigma.
+    D is derived from retroreflection, for which the half vector equals the direction: f(w, w) = D F G / (4 cos^2), so
+    D ~ f cos^2 except for masking. Dupuy2018, sec. 3.2, refines D by iteration, which is omitted here: the warp works
+    with any D, and the values compensate for its errors. sigma is the projected area of the microfacets, and
+    vndf = D max(0, wo.m) / sigma.
     """
     theta_m = np.linspace(0.0, 1.0, NORMALS) ** 2 * (0.5 * np.pi)
     held = np.minimum(theta_m, 0.5 * np.pi - 0.02)
@@ -30,7 +32,7 @@ def adapted(source: Measurement) -> Adaptive:
     mean = np.gradient(np.linspace(0.0, 1.0, NORMALS))
 
     def cosines(angle: Floats) -> Floats:
-        """max(0, wo.m), (view, phi_m, theta_m)."""
+        """max(0, wo.m) at the nodes, (view, phi_m, theta_m)."""
         along = np.sin(angle)[:, None, None] * np.sin(theta_m) * np.cos(phi_m)[:, None]
         return np.maximum(along + np.cos(angle)[:, None, None] * np.cos(theta_m), 0.0)
 
@@ -38,10 +40,11 @@ def adapted(source: Measurement) -> Adaptive:
     azimuth_weights[[0, -1]] *= 0.5
 
     def area(angle: Floats) -> Floats:
-        """The projected area of the facets, int D max(0, wo.m) dm."""
+        """The projected area of the microfacets, int D max(0, wo.m) dm."""
         return np.einsum("vpt,p,t->v", cosines(angle), azimuth_weights, ndf * weight * mean)
 
-    ndf = ndf / float(area(np.zeros(1))[0])  # at normal incidence, the projected area of the facets is the surface's
+    # at normal incidence, the projected area of the microfacets is that of the surface
+    ndf = ndf / float(area(np.zeros(1))[0])
     sigma = area(theta_m)
     vndf = cosines(theta) * (ndf * weight) / np.maximum(area(theta), 1e-9)[:, None, None]
     warp = {"phi_i": np.zeros(1), "theta_i": theta, "vndf": vndf[None]}
@@ -49,7 +52,7 @@ def adapted(source: Measurement) -> Adaptive:
 
 
 def _filled(source: Measurement, warp: dict[str, Floats]) -> Adaptive:
-    """The table with the values of `source` at each of its nodes."""
+    """The adaptive table with the given warp, and with the values of `source` at its nodes."""
     from scipy.ndimage import distance_transform_edt
 
     blank = np.ones((1, len(warp["theta_i"]), PLACES, PLACES))
@@ -58,10 +61,11 @@ def _filled(source: Measurement, warp: dict[str, Floats]) -> Adaptive:
     lit = (wi[..., 2] > 1e-6) & (wo[..., 2] > 0.0) & (factor > 0.0)
     values = np.zeros((*lit.shape, 3))
     values[lit] = source.rgb(wo[lit], wi[lit]) / factor[lit][:, None]
-    for one, valid in zip(values, lit, strict=True):  # nearest values below the horizon preserve those above it
+    # below the horizon, the nearest value above it is used, so that the interpolation does not darken f
+    for one, valid in zip(values, lit, strict=True):
         if valid.any():
             one[:] = one[tuple(distance_transform_edt(~valid, return_distances=False, return_indices=True))]
     luminance = np.maximum(values @ colours.LUMINANCE, 0.0)
-    least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # for light between nodes that are black
+    least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # so that light between black nodes is sampled too
     arrays = {"luminance": (luminance + least)[None], "values": np.moveaxis(values, -1, 1)[None]}
     return Adaptive({**warp, **arrays}, title=source.title, source=source.source)

@@ -1,4 +1,4 @@
-"""Tables in coordinates that follow the material's own distribution of normals, as in the RGL's files (Dupuy2018)."""
+"""Tables in coordinates adapted to the distribution of normals of the material, as in the RGL's files (Dupuy2018)."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from ..angles import azimuth, direction
 from ..warp import Nodes, Slices, Warp, named
 from .base import Floats, Measurement, axis, finite, in_rgb, of_channels, padded
 
-ROUNDING = 1e-6  # relative to the largest density; smaller negative ones are noise: one of nine files has -1e-10
+ROUNDING = 1e-6  # relative to the largest density; smaller negative densities are noise: one of nine files has -1e-10
 TINY_JACOBIAN = 1e-6  # as in Mitsuba's `measured`, so that densities agree at the normal too
 
 
 class Adaptive(Measurement):
-    """A table over warped half vectors, for each direction of view (Dupuy2018, sec. 4).
+    """A table over warped half vectors for each view direction (Dupuy2018, sec. 4).
 
-    A half vector m is a point of the unit square, u = (sqrt(2 theta_m / pi), phi_m / 2 pi + 1/2). For each direction of
-    view, `vndf` is the density of the visible normals over this square. The table's own coordinates are the two numbers
-    s from which sampling this density yields m: f cos theta_i = rgb(s) ndf(u) / (4 sigma). The table is therefore dense
-    where the lobe is.
+    A half vector m corresponds to a point of the unit square, u = (sqrt(2 theta_m / pi), phi_m / 2 pi + 1/2). For each
+    view direction, `vndf` is the density of the visible normals over this square. The coordinates of the table are the
+    two numbers s for which sampling from this density yields m: f cos theta_i = rgb(s) ndf(u) / (4 sigma). The table is
+    therefore densest in the lobe.
 
-    The arrays are phi_i, theta_i (nodes of view), ndf, sigma (phi, theta), vndf (phi_i, theta_i, phi_m, theta_m),
-    luminance (phi_i, theta_i, y, x), values (phi_i, theta_i, channel, y, x); all are bilinear between nodes, which
-    include the edges. The table is isotropic if phi_i has at most 2 entries. Beyond the last angle of view, the values
-    at the last one are used.
+    The arrays are phi_i and theta_i (nodes of the view direction), ndf and sigma (phi, theta), vndf (phi_i, theta_i,
+    phi_m, theta_m), luminance (phi_i, theta_i, y, x) and values (phi_i, theta_i, channel, y, x). All are interpolated
+    bilinearly between nodes, which include the edges. The table is isotropic if phi_i has at most 2 entries. Beyond the
+    last viewing angle, the values at this angle are used.
     """
 
     name = "adaptive"
@@ -88,7 +88,7 @@ class Adaptive(Measurement):
 
     @cached_property
     def _reduction(self) -> int:
-        """How many times the measured range of azimuths fits into a turn; other azimuths are mirrored into it."""
+        """The number of symmetric sectors in a full turn; one is measured, and the others are its mirror images."""
         span = self.phi[-1] - self.phi[0]
         return 1 if self.isotropic else max(1, round(2.0 * np.pi / span))
 
@@ -122,7 +122,7 @@ class Adaptive(Measurement):
         return named("rgb", padded(rgb.reshape(-1, *rgb.shape[2:])))
 
     def _folded(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction]:
-        """Both directions, mirrored so that wo lies within the measured azimuths."""
+        """Both directions, mirrored if necessary, so that wo lies within the measured azimuths."""
         if self._reduction < 2:
             return wo, wi
         flip_y = -copysign(1.0 + 0.0 * wo.y, wo.y)
@@ -130,7 +130,7 @@ class Adaptive(Measurement):
         return vec3(wo.x * flip_x, wo.y * flip_y, wo.z), vec3(wi.x * flip_x, wi.y * flip_y, wi.z)
 
     def _slices(self, wo: Direction) -> tuple[Slices, Scalar]:
-        """The views adjacent to wo with their weights, and wo's azimuth."""
+        """The measured view directions adjacent to wo with their weights, and the azimuth of wo."""
         theta, phi = polar(wo), azimuth(wo)
         row, t = self._thetas.find(theta)
         if len(self.phi) == 1:
@@ -142,14 +142,14 @@ class Adaptive(Measurement):
         return [*pairs, (second, (1.0 - t) * p), (second + 1.0, t * p)], phi
 
     def _square(self, m: Direction, phi: Scalar) -> tuple[Scalar, Scalar]:
-        """A half vector's point in the unit square."""
+        """The point of the unit square that corresponds to a half vector."""
         turn = azimuth(m) - phi if self.isotropic else azimuth(m)
         y = turn * (0.5 / ops.pi) + 0.5
         return sqrt(polar(m) * (2.0 / ops.pi)), y - floor(y)
 
     @ops.function
     def value(self, wo: Direction, wi: Direction) -> Spectrum:
-        """rgb(s) ndf(u_m) / (4 sigma(u_o)), the cosine included (Dupuy2018, eq. 3)."""
+        """f cos theta_i = rgb(s) ndf(u_m) / (4 sigma(u_o)) (Dupuy2018, eq. 3)."""
         wo, wi = self._folded(wo, wi)
         slices, phi = self._slices(wo)
         x, y = self._square(ops.normalize(wo + wi), phi)
@@ -165,7 +165,7 @@ class Adaptive(Measurement):
 
     @ops.function
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The density of the visible normal times that of its position in the luminance, per solid angle of wi."""
+        """The density of the visible normal times the density of s, converted to solid angle of wi."""
         wo, wi = self._folded(wo, wi)
         m = ops.normalize(wo + wi)
         slices, phi = self._slices(wo)
@@ -175,7 +175,7 @@ class Adaptive(Measurement):
 
     @ops.function
     def draw(self, wo: Direction, u: Direction) -> tuple[Direction, Scalar]:
-        """A position sampled by luminance, then the normal with its density, and wo reflected by this normal."""
+        """Sample s from the luminance, then the normal from `vndf`, and reflect wo about the normal."""
         folded, _ = self._folded(wo, wo)
         slices, phi = self._slices(folded)
         bright = self._bright.sample(slices, u.y, u.z)
@@ -190,8 +190,8 @@ class Adaptive(Measurement):
     # ------------------------------------------------------------------ as numbers
 
     def nodes(self) -> tuple[Floats, Floats, Floats]:
-        """wo and wi for every value of an isotropic table, (theta_i, y, x, 3), and f cos theta_i divided by the
-        value."""
+        """wo and wi for every value of an isotropic table, (theta_i, y, x, 3), and the factor between a value and
+        f cos theta_i."""
         types = backend.types("float64")
         shape = (len(self.theta), *self.luminance.shape[2:])
         view, y, x = (a.ravel() for a in np.meshgrid(*map(np.arange, shape), indexing="ij"))
@@ -235,21 +235,23 @@ class Adaptive(Measurement):
 
 @ops.function
 def polar(w: Direction) -> Scalar:
-    """The angle to the normal, from its chord: 2 asin(|w - z| / 2)."""
+    """The angle between a direction and the normal, computed from the chord: 2 asin(|w - z| / 2)."""
     chord2 = w.x * w.x + w.y * w.y + (w.z - 1.0) * (w.z - 1.0)
     return 2.0 * ops.atan2(sqrt(chord2), ops.safe_sqrt(4.0 - chord2))
 
 
 @ops.function
 def _jacobian(x: Scalar, m: Direction, wi: Direction) -> Scalar:
-    """d omega_i / du: 4 (wi.m) for the reflection, 2 pi^2 x sin theta_m for the square."""
+    """d omega_i / du: a factor 4 (wi.m) for the reflection and a factor 2 pi^2 x sin theta_m for the unit square."""
     sin = ops.safe_sqrt(m.x * m.x + m.y * m.y)
     return maximum((2.0 * ops.pi**2) * x * sin, TINY_JACOBIAN) * (4.0 * ops.abs(dot(wi, m)))
 
 
 def bilinear(table: ops.Table, x: Scalar, y: Scalar, slices: Slices | None = None) -> tuple[Scalar, ...]:
-    """Every channel of a table with nodes on the edges of the unit square, for a mixture of slices or for the only
-    slice."""
+    """All channels of a table over the unit square, interpolated bilinearly; its outermost nodes lie on the edges.
+
+    slices  a mixture of slices; None for a table without slices
+    """
     rows, columns = table.shape[-2:]
     at_x, at_y = ops.clamp(x, 0.0, 1.0) * (columns - 1.0), ops.clamp(y, 0.0, 1.0) * (rows - 1.0)
     column, row = ops.minimum(floor(at_x), columns - 2.0), ops.minimum(floor(at_y), rows - 2.0)

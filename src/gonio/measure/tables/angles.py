@@ -1,4 +1,4 @@
-"""Tables over the angles themselves, theta_i, theta_r and |phi_r - phi_i|, as first proposed by the course."""
+"""Tables over the angles theta_i, theta_r and |phi_r - phi_i|, the first parameterization that the course proposes."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from ..warp import Nodes, named
 from .base import Floats, Measurement, axis, finite, in_rgb, of_channels, padded
 from .guided import Guided
 
-SAME = 1e-6  # relative difference below which values count as reciprocal: files have six digits
+SAME = 1e-6  # relative difference below which values count as reciprocal, because files have six digits
 
 
 class Angles(Guided, Measurement):
-    """f at nodes of (theta_i, theta_r, |phi_r - phi_i|), linear between them (course notes, part B).
+    """f at nodes of (theta_i, theta_r, |phi_r - phi_i|), interpolated linearly (course notes, part B).
 
-    theta_i is the light's angle. Values are constant beyond the first and the last node. If the two axes have the same
-    nodes and the values are symmetric, only half of them are stored: those with theta_i <= theta_r.
+    theta_i is the angle of the light and theta_r that of the view. Beyond the first and the last node of an axis, f is
+    constant. If theta_i and theta_r have the same nodes and the values are symmetric, only the values with
+    theta_i <= theta_r are stored.
     """
 
     name = "angles"
@@ -45,8 +46,12 @@ class Angles(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """grid: the nodes of theta_i, theta_r and phi; values: f, one per node and channel; where: the file, for
-        errors."""
+        """A table of values at the nodes of a grid.
+
+        grid    the nodes of theta_i, theta_r and phi, rad
+        values  (theta_i, theta_r, phi, channel), f in 1/sr
+        where   name of the file in errors
+        """
         super().__init__(title, source, wavelengths)
         theta_i, theta_r, phi = grid
         self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
@@ -61,7 +66,7 @@ class Angles(Guided, Measurement):
 
     @cached_property
     def reciprocal(self) -> bool:
-        """Whether swapping the two angles changes nothing."""
+        """Whether swapping theta_i and theta_r leaves f unchanged."""
         if not np.array_equal(self.theta_i, self.theta_r):
             return False
         swapped = np.swapaxes(self.values, 0, 1)
@@ -74,7 +79,7 @@ class Angles(Guided, Measurement):
 
     @cached_property
     def _table(self) -> Table:
-        """(pair of angles, phi); for a reciprocal table, only the pairs with i <= r."""
+        """Colors by (pair of angles, phi); for a reciprocal table, only the pairs with theta_i <= theta_r."""
         rgb = padded(in_rgb(self.values, self.wavelengths))
         if self.reciprocal:
             high, low = np.tril_indices(len(self.theta_i))
@@ -93,7 +98,7 @@ class Angles(Guided, Measurement):
 
     @ops.function
     def value(self, wo: Direction, wi: Direction) -> Spectrum:
-        """f cos theta_i, linear in the three angles."""
+        """f cos theta_i, where f is interpolated linearly in the three angles."""
         of_i, of_r, of_phi = self._axes
         i, ti = of_i.find(elevation(wi))
         r, tr = of_r.find(elevation(wo))
@@ -113,7 +118,7 @@ class Angles(Guided, Measurement):
         return pairs(self.theta_i, self.theta_r, self.phi)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """The values; only those with theta_i <= theta_r, as (pair, phi, channel), if reciprocity gives the others."""
+        """The axes and the values; for a reciprocal table, only those with theta_i <= theta_r: (pair, phi, channel)."""
         values = self.values
         if self.reciprocal:
             high, low = np.tril_indices(len(self.theta_i))
@@ -145,24 +150,26 @@ class Angles(Guided, Measurement):
 
 
 def nodes(thetas: int = 46, phis: int = 73) -> tuple[Floats, Floats]:
-    """`thetas` polar and `phis` azimuth angles to tabulate. The last polar angle is slightly above the horizon, where
-    f has a limit and eval is 0."""
+    """The default nodes: `thetas` polar angles and `phis` azimuths.
+
+    The last polar angle is slightly above the horizon, where f has a limit but eval is 0.
+    """
     theta = np.linspace(0.0, 0.5 * np.pi, thetas)
     theta[-1] -= 1e-3
-    # denser around the mirror direction, |phi| = pi
+    # the nodes are denser around the mirror direction, |phi| = pi
     t = np.linspace(0.0, 1.0, phis)
     return theta, np.pi * np.sin(0.5 * np.pi * t)
 
 
 def pairs(theta_i: Floats, theta_r: Floats, phi: Floats) -> tuple[Floats, Floats]:
-    """wo and wi for every node, (N, 3) each, in the order of the table."""
+    """wo and wi at every node, (N, 3) each, in the order of the table."""
     i, r, p = (a.ravel() for a in np.meshgrid(theta_i, theta_r, phi, indexing="ij"))
     wi = np.stack([np.sin(i), 0.0 * i, np.cos(i)], -1)
     return np.stack([np.sin(r) * np.cos(p), np.sin(r) * np.sin(p), np.cos(r)], -1), wi
 
 
 def sampled(value: ops.Value, thetas: int = 46, phis: int = 73, **about: ops.Value) -> Angles:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at its nodes."""
+    """A table of a function value(wo, wi) = f cos theta_i, (N, 3), evaluated at the default nodes."""
     theta, phi = nodes(thetas, phis)
     wo, wi = pairs(theta, theta, phi)
     f = value(wo, wi) / wi[:, 2:]

@@ -1,4 +1,4 @@
-"""The base of all kinds of tables."""
+"""The base class of all kinds of tables."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ Floats = NDArray[np.float64]
 
 
 class Measurement:
-    """Values of a BRDF at pairs of directions, as stored, with their metadata.
+    """Tabulated values of a BRDF at pairs of directions, with their metadata. Each subclass is a kind of table.
 
-    name         name of the kind: "half-difference", ...
+    name         name of the kind, such as "half-difference"
     title        title of the measured material, from the file
-    source       origin: the format, and other metadata of the file
-    wavelengths  nm, one per channel; None if the channels are red, green and blue, or a single gray one
-    beside       further arrays of the values' shape from an instrument, stored in `.gonio` files: "error", the standard
-                 error of each value, and "first", its single-bounce part
+    source       format and other metadata of the file
+    wavelengths  one wavelength per channel, nm; None if the channels are red, green and blue, or a single gray channel
+    beside       further arrays that an instrument has measured, of the same shape as the values, stored in `.gonio`
+                 files: "error", the standard error of each value, and "first", its single-bounce part
 
-    A kind defines `value`, `pdf` and `sample` with the functions of `gonio.ops`, so that it runs in renders and
+    A kind defines `value`, `pdf` and `draw` with the functions of `gonio.ops`, so they can be used in renders and in
     shaders.
     """
 
@@ -52,21 +52,21 @@ class Measurement:
         raise NotImplementedError
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density of `draw`, 1/sr."""
+        """The probability density with which `draw` returns wi, 1/sr."""
         raise NotImplementedError
 
     def draw(self, wo: Direction, u: Direction) -> tuple[Direction, Scalar]:
-        """A direction, and its density; a direction below the surface is a failed sample."""
+        """A sampled direction and its density. A direction below the surface is a failed sample."""
         raise NotImplementedError
 
     @property
     def reciprocal(self) -> bool:
-        """Whether swapping wo and wi changes nothing, including values interpolated between the stored ones."""
+        """Whether swapping wo and wi leaves f unchanged, also where f is interpolated."""
         return False
 
     @property
     def mirrored(self) -> bool:
-        """Whether it is mirror-symmetric to the last digit, including values interpolated between the stored ones."""
+        """Whether f is exactly mirror-symmetric, also where it is interpolated."""
         return False
 
     sums: ClassVar[bool] = False  # whether lookups search cumulative sums
@@ -76,16 +76,19 @@ class Measurement:
         return albedo(self, np.radians(ANGLES))
 
     def albedos(self) -> Floats:
-        """The directional albedo at the view angles `ANGLES`, (N, 3), from 4096 samples each: within a few 0.001."""
+        """The directional albedo at the viewing angles `ANGLES`, (N, 3), from 4096 samples each.
+
+        The error is a few 0.001.
+        """
         return self._albedos
 
     @property
     def angular_range(self) -> AngularRange:
-        """The measured angles; beyond these, the nearest values are used."""
+        """The range of measured angles; outside it, the nearest values are used."""
         return EVERYWHERE
 
     def prepare(self) -> None:
-        """Compute expensive data for the formulas, which is impossible while a renderer is recording its kernels."""
+        """Compute data that the formulas need and that cannot be computed while a renderer records its kernels."""
 
     @property
     def isotropic(self) -> bool:
@@ -94,31 +97,31 @@ class Measurement:
     # ------------------------------------------------------------------ as numbers
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """The table's arrays, as `.gonio` files hold them: axes in radians, values in 1/sr."""
+        """The arrays of the table, as stored in `.gonio` files: axes in radians, values in 1/sr."""
         raise NotImplementedError
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: object) -> Measurement:
-        """The inverse of `arrays`. Raises InputError if they do not fit together."""
+        """A table from its arrays, the inverse of `arrays`. Raises InputError if the arrays are inconsistent."""
         raise NotImplementedError
 
     @property
     def flaws(self) -> dict[str, float]:
-        """Defects of the values, as fractions of their number: "negative", "invalid"; they are preserved."""
+        """The fractions of the values that are "negative" or "invalid"; these values are not changed."""
         return {}
 
     @property
     def shape(self) -> dict[str, int]:
-        """Values along each axis, by the axis's name."""
+        """The number of values along each axis, by the name of the axis."""
         raise NotImplementedError
 
     @property
     def range(self) -> tuple[float, float]:
-        """The lowest and the highest stored value that is valid."""
+        """The lowest and the highest of the valid stored values."""
         raise NotImplementedError
 
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
-        """f cos theta_i for pairs, (N, 3), in float64; 0 below the surface."""
+        """f cos theta_i for pairs of directions, (N, 3), computed in float64; 0 below the surface."""
         types = backend.types("float64")
         rgb = np.empty((len(wo), 3))
         for start in range(0, len(wo), CHUNK):
@@ -134,8 +137,10 @@ POINTS = 4096  # samples per albedo
 
 
 def albedo(table: Measurement, theta: Floats) -> Floats:
-    """int f cos theta_i d omega_i at view angles theta [rad], (N, 3), from the table's own samples at the points of a
-    lattice."""
+    """The directional albedo, int f cos theta_i d omega_i, at viewing angles theta [rad], (N, 3).
+
+    It is estimated from samples of the table at the points of a lattice.
+    """
     types = backend.types("float64")
     lattice = r_sequence(POINTS, 3, shift=0.5)
     albedos = []
@@ -149,7 +154,7 @@ def albedo(table: Measurement, theta: Floats) -> Floats:
     return np.array(albedos)
 
 
-CHUNK = 1 << 19  # pairs at once, which bounds memory
+CHUNK = 1 << 19  # number of pairs evaluated at once, which bounds memory
 
 
 def _named(thing: object) -> tuple[str, type[Measurement]] | None:
@@ -165,10 +170,10 @@ def above(wo: Direction, wi: Direction) -> Mask:
 
 
 def in_rgb(values: Floats, wavelengths: Floats | None, where: str = "") -> Floats:
-    """Values with channels last as red, green, blue: spectra are viewed under D65, a single channel is gray.
+    """Convert values, channels last, to linear sRGB: spectra under D65, a single channel to gray.
 
-    wavelengths  nm, one per channel; None for values without wavelengths
-    where        the file, for errors
+    wavelengths  one wavelength per channel, nm; None for values without wavelengths
+    where        name of the file in errors
     """
     channels = values.shape[-1]
     if wavelengths is not None:
@@ -187,13 +192,16 @@ def of_channels(channels: tuple[Scalar, ...]) -> Spectrum:
 
 
 def padded(values: Floats) -> Floats:
-    """Colors with a fourth channel of 0: one fetch reads four."""
+    """Append a fourth channel of 0 to colors, because a fetch reads four channels at once."""
     return np.concatenate([values, np.zeros((*values.shape[:-1], 1))], axis=-1)
 
 
 def axis(values: NDArray[np.generic], name: str, where: str, low: float, high: float) -> Floats:
-    """An axis as float64. Raises InputError, which names `where` and the axis, unless it is finite, increasing and
-    within [low, high] up to rounding."""
+    """Convert an axis to float64.
+
+    Raises InputError, which names `where` and the axis, unless the numbers are finite, increasing and within [low,
+    high] up to rounding.
+    """
     nodes = np.asarray(values, np.float64)
     if nodes.ndim != 1 or len(nodes) < 1 or not np.all(np.isfinite(nodes)):
         raise InputError(f"the axis {name} is not a list of finite numbers", where)
@@ -205,7 +213,7 @@ def axis(values: NDArray[np.generic], name: str, where: str, low: float, high: f
 
 
 def finite(values: ArrayLike, name: str, where: str, hint: str = "the file is damaged") -> Floats:
-    """Values as float64. Raises InputError, which names `where` and `name`, unless they are finite numbers."""
+    """Convert values to float64. Raises InputError, which names `where` and `name`, unless all are finite numbers."""
     try:
         array = np.asarray(values, np.float64)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Tables without a density of their own, which are sampled by a guide computed from their values."""
+"""Tables without a sampling method of their own, which are sampled with a guide computed from their values."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .base import Measurement, above
 
 
 class Guided(Measurement):
-    """A table sampled by a guide (`gonio.material.guide`) computed from its own values."""
+    """A table that is sampled with a guide (`gonio.material.guide`), computed from its values."""
 
     transmits = False
 
     def eval(self, wo: Direction, wi: Direction) -> Spectrum:
-        """f cos theta_i, 0 below the surface, from which the guide is computed."""
+        """f cos theta_i, from which the guide is computed; 0 below the surface."""
         return where(above(wo, wi), self.value(wo, wi), 0.0)
 
     @cached_property
@@ -24,7 +24,7 @@ class Guided(Measurement):
         return guide_search.of_values(self)
 
     def prepare(self) -> None:
-        """Compute the guide, by which directions are sampled."""
+        """Compute the guide with which directions are sampled."""
         _ = self.guide
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:

@@ -1,4 +1,4 @@
-"""Tables over half vector and difference angle, as in the MERL database (Matusik2003)."""
+"""Tables over half and difference angles, as in the MERL database (Matusik2003)."""
 
 from __future__ import annotations
 
@@ -17,20 +17,21 @@ from ..warp import named
 from .base import Floats, Measurement, finite, in_rgb, of_channels, padded
 from .guided import Guided
 
-GRAZING = 0.03  # smallest cosine of light at which f cos theta_i determines f: 1.7 degrees from the horizon
+GRAZING = 0.03  # smallest cos theta_i at which f is computed from f cos theta_i: 1.7 degrees above the horizon
 
 
 class HalfDifference(Guided, Measurement):
-    """f over (theta_h, theta_d, phi_d) in cells, theta_h by its square root (Rusinkiewicz1998, Matusik2003).
+    """f in cells of (theta_h, theta_d, phi_d), with theta_h divided by its square root (Rusinkiewicz1998, Matusik2003).
 
-    Cell (i, j, k) of (n, m, l) covers theta_h from (i / n)^2 to ((i + 1) / n)^2 quarter turns, theta_d in equal steps
-    of a quarter turn, phi_d in equal steps of half a turn, or of a full one. Half a turn suffices for reciprocal
-    tables, since swapping wo and wi adds pi to phi_d. Values belong to the centers of cells, also with respect to the
-    square root, and are linear between them; phi_d is periodic. Before the first center and beyond the last, values are
-    constant: in a table of MERL's size, theta_h > 89.0 and theta_d > 89.5 degrees are extrapolated.
+    Of n x m x l cells, cell (i, j, k) covers theta_h from (i / n)^2 to ((i + 1) / n)^2 quarter turns. theta_d is
+    divided into m equal steps over a quarter turn, and phi_d into l equal steps over half a turn or a full turn. Half a
+    turn suffices for reciprocal tables, because swapping wo and wi adds pi to phi_d. Each value applies at the center
+    of its cell in (sqrt(theta_h), theta_d, phi_d); values between centers are interpolated linearly, and phi_d is
+    periodic. Outside the first and the last center, values are constant: in a table of MERL's size, values for
+    theta_h > 89.0 and theta_d > 89.5 degrees are extrapolated.
 
-    A negative cell is invalid, with a value of 0. Its number is preserved; the interpolation replaces it by the number
-    of the preceding valid cell along theta_d, where both directions are higher.
+    A cell with a negative value is invalid. The stored value is preserved, but the interpolation uses the value of the
+    preceding valid cell along theta_d instead, where both directions are farther from the horizon.
     """
 
     name = "half-difference"
@@ -49,7 +50,12 @@ class HalfDifference(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """values  (theta_h, theta_d, phi_d, channel); turn: pi or 2 pi, the range of the axis phi_d"""
+        """A table of cells.
+
+        values  (theta_h, theta_d, phi_d, channel), f in 1/sr
+        turn    range of phi_d: pi or 2 pi
+        where   name of the file in errors
+        """
         super().__init__(title, source, wavelengths)
         self.values = finite(values, "the table", where)
         self.turn = float(turn)
@@ -64,17 +70,17 @@ class HalfDifference(Guided, Measurement):
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
-        """Which cells are valid (not negative)."""
+        """Mask of the valid cells, whose values are not negative."""
         return np.asarray(self.values.min(axis=-1) >= 0.0)
 
     @cached_property
     def mirrored(self) -> bool:
-        """Whether phi_d and -phi_d have the same values."""
+        """Whether the values at phi_d and -phi_d are equal."""
         return bool(np.allclose(self.values, self.values[:, :, ::-1], rtol=1e-9, atol=0.0))
 
     @property
     def reciprocal(self) -> bool:
-        """Whether its coordinates ensure reciprocity: with half a turn of phi_d."""
+        """Whether the coordinates ensure reciprocity, because phi_d covers half a turn."""
         return self.turn < 4.0
 
     # ------------------------------------------------------------------ as formulas
@@ -90,12 +96,16 @@ class HalfDifference(Guided, Measurement):
 
     @property
     def _folded(self) -> bool:
-        """Whether half of the table, up to a phi_d of a quarter turn, suffices: fewer bytes are faster to fetch."""
+        """Whether the half of the table up to a quarter turn of phi_d suffices; a smaller table is faster to fetch."""
         return self.mirrored and self.reciprocal and self.values.shape[2] % 2 == 0
 
     def _held(self, values: Floats) -> Floats:
-        """Invalid cells replaced by the last valid one at a smaller theta_d, where both directions are higher; if there
-        is none, by the nearest, with a step along theta_h counted as four of the others."""
+        """Values in which invalid cells are replaced.
+
+        Each gets the value of the last valid cell at a smaller theta_d, where both directions are farther from the
+        horizon. If there is no such cell, it gets the value of the nearest valid cell, where a step along theta_h
+        counts as four steps along the other axes.
+        """
         step = np.arange(values.shape[1])[None, :, None]
         last = np.maximum.accumulate(np.where(self.valid, step, -1), axis=1)
         held = np.take_along_axis(values, np.maximum(last, 0)[..., None], axis=1)
@@ -109,7 +119,7 @@ class HalfDifference(Guided, Measurement):
 
     @ops.function
     def value(self, wo: Direction, wi: Direction) -> Spectrum:
-        """f cos theta_i, linear in the table's own coordinates."""
+        """f cos theta_i, where f is interpolated linearly in the coordinates of the table."""
         theta_h, theta_d, phi_d = half_difference(wo, wi)
         n, m, count = map(float, self.values.shape[:3])
         x = clamp(sqrt(maximum(theta_h * (2.0 / ops.pi), 0.0)) * n - 0.5, 0.0, n - 1.0)
@@ -125,7 +135,8 @@ class HalfDifference(Guided, Measurement):
         return total * wi.z
 
     def _azimuth_cell(self, at: Scalar, count: float) -> tuple[tuple[Scalar, Scalar], Scalar]:
-        """The cells on both sides of a phi_d in units of cells, and the fraction of the way between their centers."""
+        """The cells on both sides of phi_d, given in units of cells, and the fraction of the distance between their
+        centers."""
         if self._folded:
             at = at - floor(at * (1.0 / count)) * count
             z = clamp(minimum(at, count - at) - 0.5, 0.0, 0.5 * count - 1.0)
@@ -160,7 +171,7 @@ class HalfDifference(Guided, Measurement):
 
 
 def centres(shape: tuple[int, int, int], turn: float = np.pi) -> tuple[Floats, Floats]:
-    """wo and wi at the center of every cell, (N, 3) each, in the order of the table; some lie below the surface."""
+    """wo and wi at the center of every cell, (N, 3) each, in the order of the table. Some are below the surface."""
     n, m, count = shape
     theta_h = ((np.arange(n) + 0.5) / n) ** 2 * (0.5 * np.pi)
     theta_d = (np.arange(m) + 0.5) / m * (0.5 * np.pi)
@@ -169,7 +180,10 @@ def centres(shape: tuple[int, int, int], turn: float = np.pi) -> tuple[Floats, F
 
 
 def pair_at(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats]:
-    """wo and wi for a half vector in the x-z plane and a difference: the inverse of `angles.half_difference`."""
+    """wo and wi from their half and difference angles, with the half vector in the x-z plane.
+
+    This is the inverse of `angles.half_difference`.
+    """
     sin_h, cos_h, sin_d, cos_d = np.sin(theta_h), np.cos(theta_h), np.sin(theta_d), np.cos(theta_d)
     along, side = sin_d * np.cos(phi_d), sin_d * np.sin(phi_d)
     offset = np.stack([along * cos_h, side, -along * sin_h], -1)
@@ -180,15 +194,15 @@ def pair_at(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Fl
 def sampled(
     value: ops.Value, shape: tuple[int, int, int] = (90, 90, 180), turn: float = np.pi, **about: ops.Value
 ) -> HalfDifference:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at the centers of the cells.
+    """A table of a function value(wo, wi) = f cos theta_i, (N, 3), evaluated at the centers of the cells.
 
-    A cell whose center lies below the surface is invalid: -1. Half a turn of phi_d holds one value f for a pair and its
-    swapped pair, whose values are f cos theta_i and f cos theta_o if the material is reciprocal. Least squares of the
-    two give
+    A cell whose center lies below the surface is invalid; its value is -1. If phi_d covers half a turn, a pair and its
+    swapped pair share one value of f. For a reciprocal material, the function returns v = f cos theta_i and
+    v' = f cos theta_o for the two. The least-squares solution for f is
 
         f = (v cos theta_i + v' cos theta_o) / (cos^2 theta_i + cos^2 theta_o).
 
-    The mean of the quotients would divide the error of a value near grazing angles by a cosine close to 0.
+    The mean of v / cos theta_i and v' / cos theta_o would amplify errors at grazing angles, where a cosine is near 0.
     """
     wo, wi = centres(shape, turn)
     lowest = np.minimum(wo[:, 2], wi[:, 2])
@@ -197,7 +211,7 @@ def sampled(
     cosine_o, cosine_i = wo[lit, 2:], wi[lit, 2:]
     forward = value(wo[lit], wi[lit])
     f = (forward * cosine_i + value(wi[lit], wo[lit]) * cosine_o) / (cosine_i**2 + cosine_o**2)
-    if turn > 4.0:  # each has its own cell, but the quotient is unreliable at grazing angles
+    if turn > 4.0:  # each pair has its own cell, but the quotient is unreliable at grazing angles
         f = np.where(cosine_i > GRAZING, forward / cosine_i, f)
     values[lit] = np.maximum(f, 0.0)
     return HalfDifference(values.reshape(*shape, 3), turn, **about)

@@ -15,14 +15,16 @@ from .base import Floats
 from .log_table import COLOURS, from_cosines, head, unpacked
 from .rebuilt import Rebuilt
 
-MIN_LUMINANCE = 0.02  # fraction of a view's mean luminance, for light between nodes that are black
+# lower bound of the luminance, relative to its mean for a view direction, so that light between black nodes is sampled
+MIN_LUMINANCE = 0.02
 
 
 class LogAdaptive(Rebuilt):
-    """An adaptive table of asinh(value / offset) as cosine coefficients over (view, y, x), each a multiple of `step`.
+    """An adaptive table of asinh(value / offset), stored as cosine coefficients over (view, y, x).
 
-    asinh is logarithmic for large values of either sign, since real files have small negative values. Samples follow
-    the luminance of these values, so `luminance` need not be stored.
+    Each coefficient is rounded to a multiple of `step`. asinh is logarithmic for large values of either sign, and is
+    also defined for the small negative values in real files. Directions are sampled according to the luminance of the
+    values, so the array `luminance` is not stored.
     """
 
     name = "adaptive-log"
@@ -33,7 +35,11 @@ class LogAdaptive(Rebuilt):
     }
 
     def __init__(self, stored: Mapping[str, NDArray[np.generic]], where: str = "", **about: ops.Value) -> None:
-        """stored  the arrays of `Rebuilt` without luminance and values, and cells, scale (1, step, offset), codes"""
+        """A table from the arrays of a file.
+
+        stored  the arrays of `Rebuilt` without luminance and values, and: cells, scale (1, step, offset), codes
+        where   name of the file in errors
+        """
         self.stored = dict(stored)
         shape, _, step, offset = head(stored, where)
         views = np.size(stored["phi_i"]), np.size(stored["theta_i"])
@@ -51,6 +57,9 @@ class LogAdaptive(Rebuilt):
 
 
 def log_values(values: Floats, offset: float) -> Floats:
-    """asinh(value / offset) as brightness and two differences, (view, y, x, 3), from (phi_i, theta_i, 3, y, x)."""
+    """Convert values (phi_i, theta_i, 3, y, x) to asinh(value / offset) as brightness and two color differences.
+
+    The result has the shape (view, y, x, 3).
+    """
     last = np.moveaxis(values, 2, -1)
     return np.arcsinh(last.reshape(-1, *last.shape[2:]) / offset) @ COLOURS.T

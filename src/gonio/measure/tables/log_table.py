@@ -17,22 +17,24 @@ from .half_difference import HalfDifference, centres
 
 Ints = NDArray[np.int64]
 
-LARGEST = 90 * 90 * 360  # limit on the number of cells in a compressed file: the largest of MERL's sizes
-PLANES = 3  # bytes of an integer
-# Raw streams without a header, so a file cannot request more memory than these settings. The context bits are 0 because
-# bytes of integers are not text.
+LARGEST = 90 * 90 * 360  # maximum number of cells in a compressed file: the largest of MERL's sizes
+PLANES = 3  # bytes per integer
+# The streams are raw, without a header, so a file cannot request more memory than these settings. The context bits are
+# 0 because the bytes of integers are not text.
 CODER = [{"id": lzma.FILTER_LZMA2, "dict_size": 1 << 20, "lc": 0, "lp": 0, "pb": 0}]
-# Brightness and two differences, orthonormal: the channels of most materials differ by a nearly constant factor.
+# An orthonormal basis of brightness and two color differences: the channels of most materials differ by a nearly
+# constant factor.
 COLOURS = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, -1.0], [0.5, -1.0, 0.5]])
 COLOURS = COLOURS / np.linalg.norm(COLOURS, axis=1, keepdims=True)
 
 
 class LogTable(HalfDifference):
-    """A table of log(f + offset) as cosine coefficients, each rounded to a multiple of `step`.
+    """A table of log(f + offset), stored as cosine coefficients, each rounded to a multiple of `step`.
 
-    The discrete cosine transform over (theta_h, theta_d, phi_d) concentrates smooth parts in few numbers; most others
-    become 0. Rounding causes a uniform error of the logarithm, and hence a relative error of f. Cells whose center lies
-    below the surface are invalid again; other invalid cells hold the values of the cosine series.
+    The discrete cosine transform over (theta_h, theta_d, phi_d) represents the smooth parts by few coefficients; most
+    of the others are rounded to 0. Rounding causes a uniform error of the logarithm, and hence a relative error of f.
+    When the table is read, cells whose center lies below the surface are invalid. All other cells, including those that
+    were invalid in the original, have the values of the cosine series.
     """
 
     name = "log-table"
@@ -42,7 +44,11 @@ class LogTable(HalfDifference):
     }
 
     def __init__(self, stored: Mapping[str, NDArray[np.generic]], where: str = "", **about: ops.Value) -> None:
-        """stored  the arrays of the file: cells, scale (turn, step, offset), codes"""
+        """A table from the arrays of a file.
+
+        stored  the arrays: cells, scale (turn, step, offset), codes
+        where   name of the file in errors
+        """
         self.stored = dict(stored)
         shape, turn, step, offset = head(stored, where)
         logs = self.synthesis(unpacked(stored["codes"], self.frequencies(stored, shape, where), where) * step, shape)
@@ -52,7 +58,7 @@ class LogTable(HalfDifference):
         super().__init__(values, turn, where=where, **about)
 
     def frequencies(self, stored: Mapping[str, NDArray[np.generic]], shape: tuple[int, ...], where: str) -> Shape:
-        """The number of coefficients along each axis; `where` is the file, for errors."""
+        """The number of coefficients along each axis; `where` is the name of the file in errors."""
         return shape[0], shape[1], shape[2]
 
     def synthesis(self, numbers: Floats, shape: Shape) -> Floats:
@@ -109,14 +115,17 @@ def above(shape: Shape, turn: float) -> NDArray[np.bool_]:
 
 @lru_cache(maxsize=8)
 def _order(shape: Shape) -> Ints:
-    """Frequencies from low to high, so that most zeros are contiguous."""
+    """The order of coefficients from low to high frequency, so that most zeros are contiguous."""
     along = np.meshgrid(*(np.arange(n) / n for n in shape), indexing="ij")
     return np.argsort(np.sum(along, axis=0).ravel(), kind="stable")
 
 
 def packed(numbers: Ints) -> NDArray[np.uint8]:
-    """Integers by frequency, (..., 3), as bytes: absolute values and signs folded into one, then all low bytes, all
-    middle ones and all high ones, without the zeros at the end."""
+    """Compress integer coefficients, (..., 3), to bytes.
+
+    The coefficients are sorted by frequency, without the trailing zeros. Sign and absolute value are combined into one
+    non-negative integer. All low bytes come first, then all middle bytes, then all high bytes.
+    """
     shape = numbers.shape[0], numbers.shape[1], numbers.shape[2]
     inline = numbers.reshape(-1, 3)[_order(shape)]
     used = np.flatnonzero(inline.any(axis=1))
@@ -127,7 +136,7 @@ def packed(numbers: Ints) -> NDArray[np.uint8]:
 
 
 def unpacked(codes: NDArray[np.generic], shape: Shape, where: str = "") -> Floats:
-    """The inverse of `packed`, (..., 3). Raises InputError, which names `where`, for bytes that are not its result."""
+    """The inverse of `packed`: coefficients, (..., 3). Raises InputError, which names `where`, for invalid bytes."""
     row = 3 * PLANES
     most = row * shape[0] * shape[1] * shape[2]
     try:

@@ -1,4 +1,4 @@
-"""Half-difference tables as products of a few factors, which several materials may share."""
+"""Half-difference tables stored as products of a few factors, which several materials may share."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ BASES = ("basis_theta_h", "basis_theta_d", "basis_phi_d")
 
 
 class LowRank(LogTable):
-    """A table of log(f + offset) as core x basis x basis x basis, one basis per axis (Tucker1966).
+    """A table of log(f + offset), stored as core x basis x basis x basis, with one basis per axis (Tucker1966).
 
-    The bases are the leading singular vectors of the slices along each axis, of one material or of several, which then
-    share them in one file. The core's numbers are integers times `step`.
+    The bases are the leading singular vectors of the slices along each axis. They are computed from one material, or
+    from several, which then share them in one file. The entries of the core are integer multiples of `step`.
     """
 
     name = "low-rank"
@@ -42,12 +42,12 @@ class LowRank(LogTable):
 
 
 def expanded(core: Floats, bases: list[Floats]) -> Floats:
-    """core x basis x basis x basis."""
+    """The product core x basis x basis x basis."""
     for axis, basis in enumerate(bases):
         core = np.moveaxis(np.tensordot(basis, core, axes=(1, axis)), 0, axis)
     return core
 
 
 def projected(logs: Floats, bases: list[Floats]) -> Floats:
-    """The core closest to given logarithms, for bases with orthonormal columns."""
+    """The core that approximates given logarithms best, for bases with orthonormal columns."""
     return expanded(logs, [basis.T for basis in bases])

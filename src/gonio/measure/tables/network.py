@@ -1,4 +1,4 @@
-"""Small networks in place of tables (Sztrajman2021)."""
+"""Small neural networks in place of tables (Sztrajman2021)."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ SHAPES = {"kernel0": (6, 21), "bias0": (21,), "kernel1": (21, 21), "bias1": (21,
 
 
 class Network(Guided, Measurement):
-    """f = exp(network(half vector, difference vector)) - 1, with 6 -> 21 -> 21 -> 3 rectified units, 675 weights.
+    """A neural network: f = exp(network(half vector, difference vector)) - 1.
 
-    The half vector is rotated above x; the difference vector is the light's direction in its frame, on the side of
-    y >= 0, so swapping the two directions changes nothing. Negative outputs are 0. The network itself is evaluated
-    wherever f is: in renders and in shaders.
+    The network has 6 inputs, two hidden layers of 21 units with ReLU activation, and 3 outputs: 675 weights in total.
+    The half vector is rotated into the x-z plane. The difference vector is wi in the frame of the half vector, mirrored
+    to y >= 0, so f is reciprocal. Negative values of f are replaced by 0. Renders and shaders evaluate the network
+    itself, not a table.
     """
 
     name = "network"
@@ -44,7 +45,11 @@ class Network(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: NDArray[np.float64] | None = None,
     ) -> None:
-        """weights  float32 arrays, by the names in `SHAPES`"""
+        """A network with given weights.
+
+        weights  float32 arrays, by the names in `SHAPES`
+        where    name of the file in errors
+        """
         super().__init__(title, source)
         self.weights: dict[str, NDArray[np.float32]] = {}
         for part, shape in SHAPES.items():
@@ -58,7 +63,7 @@ class Network(Guided, Measurement):
 
     @cached_property
     def _table(self) -> ops.Table:
-        """Every weight in a row: bias and kernel of each unit, layer by layer."""
+        """All weights as one array: the bias and the kernel of each unit, layer by layer."""
         rows = [
             np.concatenate([self.weights[f"bias{layer}"][None], self.weights[f"kernel{layer}"]]).T.ravel()
             for layer in range(3)

@@ -1,4 +1,4 @@
-"""Adaptive tables stored without their visible normals."""
+"""Adaptive tables stored without the densities of their visible normals."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ...errors import InputError
 from .adaptive import Adaptive
 from .base import Floats, axis, finite
 
-LARGEST = 1 << 23  # largest number of values of a rebuilt `vndf`: six times the largest in the RGL's files
-ROUNDS = 12  # rounds of solving alternately for the normals and for the scale of each view
+LARGEST = 1 << 23  # maximum number of values of a rebuilt `vndf`: six times the largest in the RGL's files
+ROUNDS = 12  # rounds, each of which solves for the normals and for the scale of each view
 
 
 class Rebuilt(Adaptive):
-    """An adaptive table whose `vndf` is D max(0, wo.m) d omega_m / du, and not stored (Dupuy2018, eq. 5).
+    """An adaptive table whose `vndf` is not stored but computed as D max(0, wo.m) d omega_m / du (Dupuy2018, eq. 5).
 
-    `normals` are D over (phi_m, theta_m), or over theta_m only; in most files they equal `ndf`. Each view's density is
-    normalized on use, so its projected area is not needed.
+    The array `normals` holds D over (phi_m, theta_m), or over theta_m only; in most files it equals `ndf`. The density
+    for each view direction is normalized when it is computed, so the projected area is not needed.
     """
 
     name = "adaptive-rebuilt"
@@ -55,9 +55,9 @@ class Rebuilt(Adaptive):
 
 
 def facing(phi: Floats, theta: Floats, rows: int, columns: int) -> Floats:
-    """max(0, wo.m) d omega_m / du at the nodes of the square, (phi_i, theta_i, phi_m, theta_m).
+    """max(0, wo.m) d omega_m / du at the nodes of the unit square, (phi_i, theta_i, phi_m, theta_m).
 
-    For an isotropic table phi_m is relative to the view's azimuth.
+    For an isotropic table, phi_m is relative to the azimuth of the view direction.
     """
     x = np.linspace(0.0, 1.0, columns)
     theta_m, phi_m = x * x * (0.5 * np.pi), np.linspace(-np.pi, np.pi, rows)
@@ -69,15 +69,16 @@ def facing(phi: Floats, theta: Floats, rows: int, columns: int) -> Floats:
 
 
 def scaled(densities: Floats) -> Floats:
-    """The densities with a mean of 1 per view."""
+    """Densities, scaled to a mean of 1 for each view direction."""
     mean = densities.mean(axis=(2, 3), keepdims=True)
     return densities / np.where(mean > 0.0, mean, 1.0)
 
 
 def normals_of(table: Adaptive) -> Floats:
-    """D over the unit square, such that `vndf` approximates D max(0, wo.m) d omega_m / du.
+    """D over the unit square, fitted so that D max(0, wo.m) d omega_m / du approximates `vndf`.
 
-    Least squares over all views, each up to a factor; over theta_m only if the table is isotropic.
+    The fit is a least-squares fit over all view directions, each with a free scale factor. D depends on theta_m only if
+    the table is isotropic.
     """
     rows, columns = table.vndf.shape[2:]
     cosines = facing(table.phi, table.theta, rows, columns)

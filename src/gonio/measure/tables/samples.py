@@ -1,4 +1,4 @@
-"""Values at scattered pairs of directions, as measured by a gonioreflectometer."""
+"""Values at unordered pairs of directions, as a gonioreflectometer measures them."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from .base import Floats, Measurement, finite, in_rgb
 from .guided import Guided
 from .half_difference import HalfDifference, centres
 
-CELLS = (45, 30, 30)  # of the table that interpolates the samples
-NEIGHBORS = 24  # samples from which a cell is interpolated
-DARK = 1e-3  # fraction of the median value: separates absolute from relative differences
-AROUND = np.radians(10.0)  # smallest measured angle below which the normal lies among measured directions
+CELLS = (45, 30, 30)  # number of cells of the table that interpolates the samples
+NEIGHBORS = 24  # number of samples from which a cell is interpolated
+DARK = 1e-3  # fraction of the median value: differences are absolute below and relative above
+AROUND = np.radians(10.0)  # if the smallest measured angle is less, measured directions surround the normal
 UNIT = 1e-3  # largest deviation of a direction's length from 1
-SAME = 1e-6  # distance of features below which samples are repeated measurements
+SAME = 1e-6  # distance of coordinates below which samples count as repeated measurements
 
 
 class Samples(Guided, Measurement):
-    """f at pairs of directions (theta_i, phi_i, theta_r, phi_r), in no order.
+    """f at unordered pairs of directions, (theta_i, phi_i, theta_r, phi_r).
 
-    Between them, the logarithm of f is interpolated from the 24 nearest samples by a linear radial basis function of
-    the distance in sqrt(theta_h), theta_d and phi_d. This is done once, at the centers of a half-difference table,
-    which is evaluated from then on. A pair shares its value with its mirror image and its swapped pair: isotropy and
-    reciprocity are assumed.
+    The logarithm of f is interpolated from the 24 nearest samples by linear radial basis functions of the distance in
+    sqrt(theta_h), theta_d and phi_d. The interpolation is computed once, at the cell centers of a half-difference
+    table, which is then evaluated in place of the samples. Isotropy and reciprocity are assumed: a pair has the same
+    value as its mirror image and as its swapped pair.
     """
 
     name = "samples"
-    reciprocal, mirrored = True, True  # by interpolation
+    reciprocal, mirrored = True, True  # ensured by the interpolation
     axes: ClassVar[Mapping[str, str]] = {"directions": "theta_i, phi_i, theta_r, phi_r of a sample, rad"}
 
     def __init__(
@@ -48,7 +48,12 @@ class Samples(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """directions: (N, 4), as above, i the light's; values: (N, channel)"""
+        """A table of samples.
+
+        directions  (N, 4), theta and phi of the light (i) and of the view (r), rad
+        values      (N, channel), f in 1/sr
+        where       name of the file in errors
+        """
         super().__init__(title, source, wavelengths)
         self.directions, self.values = finite(directions, "the directions", where), finite(values, "the values", where)
         if self.directions.ndim != 2 or self.directions.shape[1] != 4 or self.values.ndim != 2:
@@ -75,10 +80,10 @@ class Samples(Guided, Measurement):
         title: str = "",
         source: Mapping[str, str] | None = None,
     ) -> Samples:
-        """Samples of pairs of directions.
+        """A table of samples from pairs of unit vectors.
 
         wo, wi  (N, 3), unit vectors above the surface, z up
-        f       (N,) or (N, channel), the BRDF in 1/sr without the cosine
+        f       (N,) or (N, channel), the BRDF in 1/sr, without the cosine
         Raises InputError for other shapes, directions below the surface, and vectors that are not normalized.
         """
         hint = "give finite numbers"
@@ -109,8 +114,10 @@ class Samples(Guided, Measurement):
 
     @property
     def angular_range(self) -> AngularRange:
-        """The combined range of both directions, since by reciprocity each pair also stands for the pair with wo and wi
-        swapped. The range includes the normal if measured directions surround it."""
+        """The range of measured angles, combined for wo and wi, because reciprocity also gives the swapped pair.
+
+        The range includes the normal if measured directions surround it.
+        """
         ends = np.sort(self.directions[:, [0, 2]], axis=None)
         ends[0] = 0.0 if ends[0] < AROUND else ends[0]
         return of_nodes(ends, ends, np.zeros(0))
@@ -167,9 +174,10 @@ class Samples(Guided, Measurement):
 
 
 def _features(wo: Floats, wi: Floats) -> Floats:
-    """The coordinates of a pair, (N, 4): theta_h by its square root, theta_d, and phi_d weighted by theta_d.
+    """Coordinates of pairs for the interpolation, (N, 4): sqrt(theta_h), theta_d, and two functions of phi_d.
 
-    cos 2 phi_d and |sin 2 phi_d| are the same for a pair, its mirror image and its swapped pair.
+    These functions, cos 2 phi_d and |sin 2 phi_d|, are weighted by sin theta_d. They are the same for a pair, its
+    mirror image and its swapped pair.
     """
     h, d = wo + wi, wi - wo
     flat, length = np.hypot(h[:, 0], h[:, 1]), np.linalg.norm(h, axis=1)
@@ -184,12 +192,15 @@ def _features(wo: Floats, wi: Floats) -> Floats:
 
 
 def plan() -> Floats:
-    """Directions of a goniometer for isotropic materials, (N, 4): light from 10 to 80 degrees, views all around."""
+    """Directions at which a goniometer measures an isotropic material, (N, 4): theta_i, phi_i, theta_r, phi_r.
+
+    The light is at 10 to 80 degrees from the normal, and the view directions cover the hemisphere.
+    """
     theta_i = np.radians(np.arange(10.0, 81.0, 10.0))
     theta_r = np.radians(np.concatenate([np.arange(0.0, 76.0, 5.0), [79.0]]))
     phi = np.radians(np.arange(-170.0, 181.0, 10.0))
     i, r, p = (a.ravel() for a in np.meshgrid(theta_i, theta_r, phi, indexing="ij"))
-    # plus fine steps around each mirror direction, where lobes are
+    # finer steps around each mirror direction, where the lobes are
     steps = np.radians(np.arange(-8.0, 9.0, 1.0))
     near_i, step = (a.ravel() for a in np.meshgrid(theta_i, steps, indexing="ij"))
     near_mirror = np.stack([near_i, 0.0 * near_i, np.abs(near_i + step), np.full(near_i.shape, np.pi)], -1)
@@ -198,7 +209,7 @@ def plan() -> Floats:
 
 
 def sampled(value: ops.Value, directions: Floats | None = None, **about: ops.Value) -> Samples:
-    """Samples of any f cos theta_i (wo, wi) -> (N, 3) at given directions, by default those of `plan`."""
+    """Samples of a function value(wo, wi) = f cos theta_i, (N, 3), at given directions, by default those of `plan`."""
     directions = plan() if directions is None else directions
     blank = Samples(directions, np.zeros((len(directions), 3)))
     wo, wi = blank.pairs()

@@ -1,4 +1,4 @@
-"""Tables about the mirror direction, as stored by instruments for optical design."""
+"""Tables in angles about the mirror direction, as used in optical design."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from .guided import Guided
 
 
 class Specular(Guided, Measurement):
-    """f at nodes of (theta_i, azimuth, radial), the polar angles of the view about the mirror direction of the light.
+    """f at nodes of (theta_i, azimuth, radial), where the last two give the view direction about the mirror direction.
 
-    Radial 0 is the mirror direction; azimuth 0 points from there to the normal (Zemax's tabular BSDF). Values are
-    linear between nodes and constant beyond the first and the last; an azimuth that ends at pi is mirrored, one that
-    ends at 2 pi is periodic.
+    The radial angle is 0 in the mirror direction, and the azimuth is 0 from there toward the normal, as in Zemax's
+    tabular BSDF. Values are interpolated linearly between nodes, and are constant beyond the first and the last. If the
+    azimuth ends at pi, the table is mirror-symmetric; if it ends at 2 pi, the azimuth is periodic.
     """
 
     name = "specular"
@@ -43,8 +43,12 @@ class Specular(Guided, Measurement):
         source: Mapping[str, str] | None = None,
         wavelengths: Floats | None = None,
     ) -> None:
-        """grid: the nodes of theta_i, azimuth and radial; values: f, one per node and channel; where: the file, for
-        errors."""
+        """A table of values at the nodes of a grid.
+
+        grid    the nodes of theta_i, azimuth and radial, rad
+        values  (theta_i, azimuth, radial, channel), f in 1/sr
+        where   name of the file in errors
+        """
         super().__init__(title, source, wavelengths)
         theta_i, azimuth, radial = grid
         self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
@@ -61,7 +65,7 @@ class Specular(Guided, Measurement):
 
     @property
     def mirrored(self) -> bool:
-        """Whether it is mirror-symmetric: its azimuth ends at pi."""
+        """Whether the table is mirror-symmetric, that is, whether the azimuth ends at pi."""
         return bool(self.azimuth[-1] < 1.5 * np.pi)
 
     # ------------------------------------------------------------------ as formulas
@@ -77,7 +81,7 @@ class Specular(Guided, Measurement):
 
     @ops.function
     def value(self, wo: Direction, wi: Direction) -> Spectrum:
-        """f cos theta_i, linear in the three angles."""
+        """f cos theta_i, where f is interpolated linearly in the three angles."""
         of_i, of_azimuth, of_radial = self._axes
         azimuth, radial = about_mirror(wo, wi, self.azimuth[-1] > 1.5 * np.pi)
         i, ti = of_i.find(elevation(wi))
@@ -116,10 +120,11 @@ class Specular(Guided, Measurement):
 
 @ops.function
 def about_mirror(wo: Direction, wi: Direction, full: bool) -> tuple[Scalar, Scalar]:
-    """Azimuth and radial angle of wo about the mirror direction of wi; the azimuth in [0, pi], or [0, 2 pi) if `full`.
+    """Azimuth and radial angle of wo about the mirror direction of wi.
 
-    With the light above x, the mirror direction is s = (-sin, 0, cos), the direction to the normal (cos, 0, sin), and y
-    completes the frame.
+    The azimuth is in [0, pi], or in [0, 2 pi) if `full`. If wi lies in the x-z plane, the mirror direction is
+    s = (-sin theta_i, 0, cos theta_i), and azimuth 0 is the direction (cos theta_i, 0, sin theta_i), toward the normal;
+    y completes the frame.
     """
     sin = ops.safe_sqrt(wi.x * wi.x + wi.y * wi.y)
     pole = sin == 0.0
@@ -136,8 +141,10 @@ def about_mirror(wo: Direction, wi: Direction, full: bool) -> tuple[Scalar, Scal
 
 
 def sampled(value: ops.Value, **about: ops.Value) -> Specular:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), evaluated at its nodes; for a node below the horizon or close to
-    it, slightly above the horizon."""
+    """A table of a function value(wo, wi) = f cos theta_i, (N, 3), evaluated at the nodes.
+
+    For nodes below the horizon or close to it, the function is evaluated slightly above the horizon.
+    """
     theta_i = np.radians(np.concatenate([np.arange(0.0, 86.0, 5.0), [88.0]]))
     azimuth = np.radians(np.arange(0.0, 181.0, 7.5))
     radial = np.radians(

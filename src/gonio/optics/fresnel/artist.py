@@ -13,7 +13,7 @@ from .base import r0_conductor
 Reals: TypeAlias = NDArray[np.float64]
 
 AVERAGES = {
-    "exact": "the integral",
+    "exact": "the integral of F",
     "imageworks": "the polynomial fit of Kulla2017, p. 26, in reflectivity r and edge tint g (Gulbrandsen2014)",
 }
 

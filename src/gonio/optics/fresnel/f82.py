@@ -1,4 +1,5 @@
-"""Schlick's curve with a second given value near grazing incidence: the F82 model of Adobe Standard Material."""
+"""Schlick's approximation with a second given value near grazing incidence: the F82 model of Adobe Standard
+Material."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ GREATEST = GRAZING * (1.0 - GRAZING) ** 6
 
 
 class F82(Fresnel):
-    """Schlick's curve through the exact values at 0 and 82 degrees (Kutz2021)."""
+    """Schlick's approximation, corrected to match the exact values at 0 and 82 degrees (Kutz2021)."""
 
     name = "f82"
 
@@ -38,9 +39,9 @@ def f82(cos_i: Scalar | float, r0: R, edge: R) -> R:
     """Schlick's curve for r0, minus c x (1 - x)^6 with x = cos_i; c makes the value at x = 1/7 equal to `edge`
     (Kutz2021).
 
-    It is clamped to >= 0, since a dark edge with a dark r0 would make it negative.
+    It is clamped to >= 0, because a dark edge with a dark r0 would make it negative.
     """
     x = minimum(maximum(cos_i, 0.0), 1.0)
     dip = x * sqr(1.0 - x) * sqr(sqr(1.0 - x)) * (1.0 / GREATEST)
-    # with the arguments of `maximum` in this order the gradient at r0 = 0 exists
+    # with the arguments of `maximum` in this order, the gradient at r0 = 0 exists
     return maximum(0.0, schlick(x, r0) - (schlick(GRAZING, r0) - edge) * dip)

@@ -1,7 +1,7 @@
 """Reflection by a thin film on a surface: interference of the waves from its two faces, and the resulting colors.
 
-`film_amplitudes` computes the amplitudes at one wavelength, as spectral variants need them. RGB colors are computed
-from these by one of the methods in `FORMS`. All indices are relative to the outer medium.
+`film_amplitudes` computes the amplitudes at one wavelength, as spectral variants require. RGB colors are computed by
+one of the methods in `FORMS`. All indices are relative to the outer medium.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .film_fourier import in_fourier_space
 from .polarization import Diattenuation
 
 FORMS = {
-    "local": "interference evaluated at 20 wavelengths and converted to RGB under D65 (locally spectral, OpenPBR)",
+    "local": "interference at 20 wavelengths, converted to RGB under D65 (the locally spectral method of OpenPBR)",
     "belcour-barla": "interference in Fourier space, with Gaussian fits of the color matching functions (Belcour2017)",
 }
 
@@ -69,8 +69,8 @@ def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: 
 
 
 def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
-    """Diattenuation by reflection and by refraction for light from outside. Colors are sums over wavelengths, whatever
-    the film's form."""
+    """Diattenuation by reflection and by refraction for light from outside. Colors are sums over wavelengths,
+    regardless of the film's `form`."""
 
     def summed(what: Callable[[Amplitudes], Scalar]) -> Spectrum:
         def at(eta: Scalar, k: Scalar | None, nm: Scalar | float) -> Scalar:
@@ -139,10 +139,10 @@ def _sum(
     nodes: Sequence[int],
     at: Callable[[Scalar, Scalar | None, Scalar | float], Scalar],
 ) -> Spectrum:
-    """The contribution of some of the nodes to the color of `at`.
+    """The contribution of the given nodes to the color of `at`.
 
     The red, green and blue indices are those at `RGB_WAVELENGTHS`; they are interpolated linearly between these
-    wavelengths and constant beyond.
+    wavelengths and constant beyond them.
     """
     etas, ks = channels(eta), channels_of_k(k, eta)
     mixing = WEIGHTS if len(etas) == 3 else (WEIGHTS @ colour.LUMINANCE)[:, None]

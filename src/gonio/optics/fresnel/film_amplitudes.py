@@ -101,8 +101,7 @@ class ClearFaces(NamedTuple):
 
 @function
 def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar) -> Faces | ClearFaces:
-    """The faces of a film of real index film_eta >= 1 on a base of index eta + i k, or of index eta if k is None; see
-    `Film`."""
+    """The faces of a film of real index film_eta >= 1 on a base of index eta + i k, or of real index eta; see `Film`."""
     sin2 = 1.0 - sqr(cos_i)
     inside = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
     contrast = (1.0 - film_eta) * (1.0 + film_eta)
@@ -127,7 +126,7 @@ def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickn
 def _face(above: Scalar, below: Complex, contrast: Complex, sin2: Scalar) -> tuple[Complex, Complex]:
     """(r_s, r_p) of the face between the medium a above and b below. With w = sqrt(n^2 - sin^2),
     r_s = (n_a^2 - n_b^2) / (w_a + w_b)^2 and r_p = -r_s (w_a w_b - sin^2) / (w_a w_b + sin^2), in which nothing cancels
-    for close indices."""
+    for similar indices."""
     both = Complex(above + below.re, below.im)
     s = contrast.over(both.times(both))
     product = below.scaled(above)
@@ -168,10 +167,10 @@ def airy(film: Faces | ClearFaces, wavelength: Scalar | float) -> Amplitudes:
     """The sums of all reflected waves at a wavelength, which is in the unit of the thickness.
 
     With E = e^(i delta), the numerator is r12 + r23 E = r13 (1 + r12 r23) + r23 (E - 1), where r13 is the amplitude of
-    the bare surface. In this form, it cancels only where the waves do.
+    the bare surface. In this form, cancellation occurs only where the waves themselves cancel.
     """
     turns = 2.0 * film.way / wavelength
-    half_angle = (turns - floor(turns)) * math.pi  # sine in shaders is accurate near 0 only
+    half_angle = (turns - floor(turns)) * math.pi  # the sine of shaders is accurate only near 0
     sin, cos = sincos(half_angle)
     less = Complex(-2.0 * sqr(sin), 2.0 * sin * cos)  # E - 1
     over, under = [], []

@@ -25,7 +25,7 @@ from .film_amplitudes import Amplitude, Complex, channels_of_k, faces
 
 
 def _of_unit(height: float, place: float, variance: float) -> tuple[float, float, float]:
-    """A Gaussian whose height is scaled so that y integrates to 1."""
+    """A Gaussian whose height is scaled so that the color-matching function y integrates to 1."""
     return height * math.sqrt(2.0 * math.pi * variance) / 1.0685e-7, place, variance
 
 
@@ -38,16 +38,17 @@ CURVES: tuple[Curve, Curve, Curve] = (
     (_of_unit(4.4201e-13, 1.7953e6, 9.3046e9),),
     (_of_unit(5.2481e-13, 2.2084e6, 6.6121e9),),
 )
-HARMONICS = 3  # the next is |r12 r23|^3 times the first, and the color-matching functions average it out
+HARMONICS = 3  # the fourth is |r12 r23|^3 times the first, and color-matching functions average it out
 WHITE = (0.95047, 1.0, 1.08883)  # XYZ of D65: the curves were fitted for an equal-energy spectrum
 
 
 @function
 def in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar) -> Spectrum:
-    """The color of R by Belcour2017, eq. 6 to 10.
+    """The RGB color of the reflectance of a thin film, computed in Fourier space (Belcour2017, eq. 6 to 10).
 
-    The mean term is computed per RGB channel; the harmonics of x, y and z use the red, green and blue indices,
-    respectively.
+    It is the sum of two terms. The mean of the reflectance over all phases is computed for each RGB channel. The
+    interference term is computed for the color-matching functions x, y and z, with the index of the base in red, green
+    and blue, respectively, and is then converted to RGB.
     """
     etas, ks = channels(eta), channels_of_k(k, eta)
     if len(etas) != 3:
@@ -64,7 +65,7 @@ def in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta:
 
 
 class Band(NamedTuple):
-    """The response of one color-matching function: the mean of R over wavelengths, and the contribution of
+    """The response of one color-matching function: the mean of R over all phases, and the contribution of
     interference."""
 
     mean: Scalar

@@ -7,7 +7,7 @@ from .base import Fresnel
 
 
 class One(Fresnel):
-    """F = 1: a perfect mirror, for furnace tests and tables."""
+    """F = 1, a perfect mirror, for furnace tests and tables."""
 
     name = "one"
     white = True

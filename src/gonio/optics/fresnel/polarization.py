@@ -17,8 +17,8 @@ class Diattenuation(NamedTuple, Generic[V]):
     """The effect of an interface on the two polarizations, s and p.
 
     d  (R_s - R_p) / (R_s + R_p); for refracted light, with T in place of R
-    c  cosine of the phase between s and p, times 2 sqrt(R_s R_p) / (R_s + R_p)
-    s  sine of this phase, times the same factor
+    c  cosine of the phase difference between s and p, times 2 sqrt(R_s R_p) / (R_s + R_p)
+    s  sine of this phase difference, times the same factor
     """
 
     d: V
@@ -55,7 +55,7 @@ def _reflected(cos_i: Scalar, w2: V, a: V, b: V) -> Diattenuation[V]:
 
 @function
 def refracted(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Diattenuation[Scalar]:
-    """Refraction into glass: T_p / T_s = 1 / cos^2(theta_i - theta_t), with no phase between s and p."""
+    """Refraction into glass: T_p / T_s = 1 / cos^2(theta_i - theta_t), with no phase difference between s and p."""
     g = cos_i * cos_t + (1.0 - sqr(cos_i)) / eta
     both = 1.0 / (1.0 + sqr(g))
     return Diattenuation((sqr(g) - 1.0) * both, 2.0 * g * both, zeros_like(g))

@@ -80,8 +80,8 @@ def fresnel(theta: ArrayLike, eta: ArrayLike, k: ArrayLike = 0.0) -> Interface:
     theta   angle of incidence from the normal, radians, 0 to pi/2
     eta     real part of the index on the far side divided by that on the near side, > 0; 1 / 1.5 from inside glass
     k       imaginary part of this ratio, >= 0; sign convention n = eta + i k, exp(-i omega t)
-    The three are numbers or arrays that broadcast. Returns an `Interface`. Raises InputError for values out of range.
-    Not valid for thin films, nor for light that arrives through an absorbing medium.
+    The three arguments are numbers or arrays that broadcast. Returns an `Interface`. Raises InputError for values out
+    of range. The equations are not valid for thin films or for light that arrives through an absorbing medium.
     """
     angle, eta, k = (_real(x, name) for x, name in ((theta, "theta"), (eta, "eta"), (k, "k")))
     if np.any((angle < 0.0) | (angle > np.pi / 2 * (1.0 + 1e-15))):

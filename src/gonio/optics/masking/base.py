@@ -17,7 +17,7 @@ class Masking(Part):
     The first line of a subclass's docstring is its title in the manual.
 
     smith  whether G follows from the distribution of slopes, as Smith's G does; if not, it falls off as slowly as a
-           rational function of the cosine. The axes of energy-compensation tables depend on this
+           rational function of the cosine. The axes of energy-compensation tables depend on this property
     """
 
     name: ClassVar[str] = ""
@@ -61,7 +61,7 @@ def term(name: str) -> Masking:
 def masking_shadowing(
     kind: str, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair, transmits: bool = False
 ) -> Scalar:
-    """Masking and shadowing G by the term of a given name; 0 if wo or wi sees the facet from behind.
+    """Masking and shadowing G by the term of a given name; 0 if wo or wi lies behind the facet.
 
     kind       name of the masking term
     m          normal of the facet, m.z > 0

@@ -7,9 +7,9 @@ from .schlick_ibl import SchlickIBL
 
 
 class SchlickDirect(SchlickIBL):
-    """Schlick-Smith, k = (roughness + 1)^2 / 8 (Karis2013).
+    """Schlick's approximation of Smith's G1 with k = (roughness + 1)^2 / 8 (Karis2013).
 
-    G does not tend to 1 as alpha -> 0: the term is intended for point lights and simple shading, not for compensation.
+    G does not tend to 1 as alpha -> 0. The term is intended for point lights and simple shading, not for compensation.
     """
 
     name = "schlick-direct"

@@ -15,7 +15,7 @@ def schlick_g1(v: Direction, k: Scalar) -> Scalar:
 
 
 class SchlickIBL(Masking):
-    """Schlick-Smith, k = alpha / 2 (Karis2013)."""
+    """Schlick's approximation of Smith's G1 with k = alpha / 2 (Karis2013)."""
 
     name = "schlick-ibl"
     smith = False

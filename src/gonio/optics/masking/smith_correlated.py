@@ -9,11 +9,11 @@ from .base import Masking
 
 
 class SmithCorrelated(Masking):
-    """Smith with correlated heights (Heitz2014).
+    """Height-correlated Smith masking (Heitz2014).
 
     Masking and shadowing depend on the height of the same facet. A high facet is likely to be visible from above, but a
-    low one from below, so G in transmission is Euler's beta function B(1 + Lambda(wo), 1 + Lambda(wi)) instead of
-    1 / (1 + Lambda(wo) + Lambda(wi)).
+    low facet from below. In transmission, G is therefore Euler's beta function B(1 + Lambda(wo), 1 + Lambda(wi))
+    instead of 1 / (1 + Lambda(wo) + Lambda(wi)).
     """
 
     name = "smith-correlated"

@@ -8,9 +8,10 @@ from .base import Masking
 
 
 class SmithSeparable(Masking):
-    """Smith G1 G1 (Walter2007); for Beckmann, with Walter's rational fit.
+    """Separable Smith masking, G1(wo) G1(wi) (Walter2007), with Walter's rational fit for Beckmann.
 
-    As in the course sheet and Mitsuba, G1 is the customary form of the distribution; for Beckmann, eq. 8 of the sheet.
+    As in the course sheet and in Mitsuba, G1 is the customary form for the distribution; for Beckmann, this is eq. 8 of
+    the sheet.
     """
 
     name = "smith-separable"

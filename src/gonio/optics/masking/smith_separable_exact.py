@@ -8,7 +8,7 @@ from .base import Masking
 
 
 class SmithSeparableExact(Masking):
-    """Smith G1 G1 with the exact Lambda."""
+    """Separable Smith masking, G1(wo) G1(wi), with the exact Lambda."""
 
     name = "smith-separable-exact"
 

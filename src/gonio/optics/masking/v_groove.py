@@ -8,9 +8,9 @@ from .base import Masking
 
 
 class VGroove(Masking):
-    """V-grooves (Torrance1967): every facet masks the opposite one.
+    """V-grooves, in which every facet masks the opposite one (Torrance1967).
 
-    G1 = min(1, 2 (n.m) (n.v) / (v.m)) does not depend on the width, since the masking facet has the same slope as the
+    G1 = min(1, 2 (n.m) (n.v) / (v.m)) does not depend on the width, because the masking facet has the same slope as the
     visible one.
     """
 
@@ -21,7 +21,8 @@ class VGroove(Masking):
         return v_groove(wo, wi, m)
 
     def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """max(0, G1(wo) + G1(wi) - 1): one direction sees the top of a facet, the other its bottom (Heitz2014b)."""
+        """max(0, G1(wo) + G1(wi) - 1): the top of a facet is visible from one direction, its bottom from the other
+        (Heitz2014b)."""
         return maximum(_visible_fraction(wo, m) + _visible_fraction(wi, m) - 1.0, 0.0)
 
 
@@ -33,5 +34,5 @@ def v_groove(wo: Direction, wi: Direction, m: Direction) -> Scalar:
 
 @function
 def _visible_fraction(v: Direction, m: Direction) -> Scalar:
-    """The fraction of a facet with normal m that v sees past the opposite side of the groove."""
+    """The fraction of a facet with normal m that is visible from v past the opposite side of the groove."""
     return minimum(1.0, safe_div(2.0 * m.z * abs(v.z), abs(dot(v, m))))

@@ -1,4 +1,4 @@
-"""The base class of all distributions of normals, `NDF`, and that of stretch-invariant ones, `Stretched`."""
+"""The base classes of distributions of normals: `NDF` for all, `Stretched` for stretch-invariant ones."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class NDF(Part):
     `sample` and visible normals are read from tables computed once from D (`tabulated`), with 1 + Lambda accurate to
     1e-4. The tables require a D that is isotropic at equal widths and, at unequal widths, is either stretch-invariant
     or independent of alpha.y. All methods take unit vectors of the local frame. m lies above the surface (m.z > 0); a
-    direction v may lie on either side, since Smith's terms depend on |v.z|. The first line of a subclass's docstring is
-    its title in the manual.
+    direction v may lie on either side, because Smith's terms depend on |v.z|. The first line of a subclass's docstring
+    is its title in the manual.
 
     long_tailed  whether Lambda falls off so slowly with the cosine, as 1 / cos^2, that masking is noticeable at all
                  angles (GGX); if not, masking is confined to cosines below a few alpha. The axes of energy-compensation
@@ -134,8 +134,8 @@ class NDF(Part):
         return type(self).Lambda is NDF.Lambda
 
     def sample_visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal visible from v (v.z >= 0), from tables. If `sample` is defined but not this method, a normal from
-        `sample`, visible or not."""
+        """A normal visible from v (v.z >= 0), sampled from tables. If `sample` is defined but this method is not, a
+        normal from `sample`, which need not be visible."""
         return self._visible(v, u1, u2, alpha) if self.tabulated else self.sample(u1, u2, alpha)
 
     @function
@@ -203,12 +203,12 @@ def stretch(w: Direction, alpha: Pair) -> Direction:
 
 
 class Stretched(NDF):
-    """A stretch-invariant distribution: a surface of width 1, its slopes scaled by alpha (Heitz2014, sec. 5.3).
+    """A stretch-invariant distribution: the slopes of a surface of width 1 are scaled by alpha (Heitz2014, sec. 5.3).
 
     A subclass describes the surface of width 1 by `density` and, if there are closed forms, `area`, `slope` and
     `visible_normal`; otherwise, tables are used as for any `NDF`. `density` and `area` are called with vectors of any
-    length: as D = P(slope) / n_z^4 and int D(m) max(0, v.m) dm, they are homogeneous of degree -4 and 1, so stretching
-    is a linear map without a Jacobian.
+    length: as D = P(slope) / n_z^4 and int D(m) max(0, v.m) dm, they are homogeneous of degree -4 and 1, so that
+    stretching is a linear map without a Jacobian.
     """
 
     name: ClassVar[str] = ""

@@ -1,4 +1,4 @@
-"""Beckmann: Gaussian slopes."""
+"""The Beckmann distribution, whose slopes are Gaussian."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ B_LIMIT = 0.99999988  # the second-largest float32 below 1
 
 
 class Beckmann(Stretched):
-    """Beckmann: Gaussian slopes.
+    """Beckmann, with Gaussian slopes.
 
     D = exp(-(m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / m_z^2) / (pi alpha_x alpha_y m_z^4) (Heitz2014; isotropic:
     Walter2007, eq. 25).

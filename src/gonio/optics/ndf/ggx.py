@@ -37,13 +37,13 @@ class GGX(Stretched):
 
     @function
     def density(self, n: Direction) -> Scalar:
-        """1 / (pi |n|^4), the density of a hemisphere, from all three components, since n_z alone would cancel at the
-        peak."""
+        """1 / (pi |n|^4), the density of a hemisphere, computed from all three components, because n_z alone would
+        cancel at the peak."""
         return ops.inv_pi / sqr(dot(n, n))
 
     @function
     def area(self, v: Direction) -> Scalar:
-        """(|v.z| + |v|) / 2, half the projected base of a hemisphere and half a disk (Heitz2014, eq. 72)."""
+        """(|v.z| + |v|) / 2: half the projected base of a hemisphere plus half a disk (Heitz2014, eq. 72)."""
         return 0.5 * (abs(v.z) + norm(v))
 
     @function
@@ -63,7 +63,7 @@ class GGX(Stretched):
         r = safe_sqrt((height - lift) * (1.0 - depth + lift))
         phi = (2.0 * ops.pi) * u1
         s, c = sincos(phi)
-        # at a grazing view and the lowest point of the cap the sum has length 0; any facet with z > 0 will do
+        # at a grazing view and the lowest point of the cap, the sum has length 0; any facet with z > 0 is valid
         return vec3(r * c + v.x, r * s + v.y, maximum(lift + (v.z - depth), 1e-12))
 
     @function

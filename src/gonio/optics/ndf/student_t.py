@@ -1,4 +1,4 @@
-"""Student-T with gamma = 3: a tail between GGX (gamma = 2) and Beckmann (gamma -> infinity)."""
+"""The Student-T distribution with gamma = 3."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .base import Stretched
 
 
 class StudentT(Stretched):
-    """Student-T with gamma = 3: a tail between GGX (gamma = 2) and Beckmann (gamma -> infinity).
+    """Student-T with gamma = 3, whose tail lies between GGX (gamma = 2) and Beckmann (gamma -> infinity).
 
     D = 1 / (pi alpha_x alpha_y m_z^4 (1 + (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / (2 m_z^2))^3) (Ribardiere2017). For
     gamma = 3, all formulas are algebraic.

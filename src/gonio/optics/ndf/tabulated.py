@@ -1,15 +1,15 @@
 """Smith's Lambda and samples of normals from D alone, by tables that are computed once.
 
 With the slope s = tan theta_m, P(s) ds = 2 pi s D cos^4 theta_m ds is the fraction of the surface with slopes from s to
-s + ds. A direction v sees the area
+s + ds. The area visible from a direction v is
 
     int D(m) max(0, v.m) dm = int P(s) a(s) ds,   a(s) = int max(0, |v.z| + s sin theta_v cos phi) dphi / (2 pi),
 
 with a in closed form, so one quadrature over s is enough (trapezoidal in log s; Heitz2014, sec. 3 and 4). Slopes are
-measured in units of w, twice the area that a grazing direction sees; for GGX, w = alpha. The area divided by |v'|, with
-v' = (w v.x, w v.y, v.z), is then a smooth function of sqrt(1 - v'.z / |v'|) at any width. With 256 nodes, 1 + Lambda is
-accurate to 1e-5 for GGX, Beckmann and Student-T, which have closed forms, and to 1e-4 for distributions whose shape
-depends on the width, such as GTR.
+measured in units of w, twice the area visible from a grazing direction; for GGX, w = alpha. The area divided by |v'|,
+with v' = (w v.x, w v.y, v.z), is then a smooth function of sqrt(1 - v'.z / |v'|) at any width. With 256 nodes,
+1 + Lambda is accurate to 1e-5 for GGX, Beckmann and Student-T, which have closed forms, and to 1e-4 for distributions
+whose shape depends on the width, such as GTR.
 
 Normals are sampled from tables of the inverse of int P ds and, for the slopes seen at grazing angles, of int s P ds.
 """
@@ -30,15 +30,15 @@ from ...ops import Direction, Pair, Scalar, Table, inset, lookup, sqrt, vec2
 Floats: TypeAlias = NDArray[np.float64]
 Density: TypeAlias = Callable[[Floats, Floats], Floats]
 
-NODES = 256  # of the projected area as a function of v'.z / |v'|, and of the inverse functions
-ROWS, FINE = 96, 1024  # widths, at equal steps of their fourth root; finer steps, at which w is stored
+NODES = 256  # number of nodes of the projected area over v'.z / |v'|, and of the inverse functions
+ROWS, FINE = 96, 1024  # widths, at equal steps of their fourth root; finer steps for w
 MIN_ROOT, MAX_SLOPE = 0.1, 1e6  # fourth root of the smallest width; larger slopes cover about D / 1e6 of the area
 STEEP = 100.0  # slope (89.4 degrees) beyond which a rise of D is due to a clamped cosine, not another lobe
-STEP, LOWEST, HIGHEST = 0.01, -16.0, 30.0  # of log s
+STEP, LOWEST, HIGHEST = 0.01, -16.0, 30.0  # step and range of log s
 SAME = 1e-4  # fraction of the surface on which two equal densities may differ
 PAIRS = ((0.1, 0.4), (0.6, 0.2), (0.05, 0.9))  # unequal widths at which D is tested
 AZIMUTHS = np.arange(7) * (2.0 * np.pi / 7.0) + 0.35  # no multiples of 90 degrees, at which lobes may be equal
-AREA, ALL, GRAZING = range(3)  # columns
+AREA, ALL, GRAZING = range(3)  # columns of the tables
 
 
 class Tables(NamedTuple):
@@ -46,7 +46,7 @@ class Tables(NamedTuple):
 
     values   three columns over (fourth root of the width, node), or over the nodes alone if the distribution is
              stretch-invariant: the area divided by |v'|; tau = s / (1 + s), with s in units of w, as a function of
-             g(fraction of the normals); and tau as a function of g(fraction of the area that a grazing direction sees).
+             g(fraction of the normals); and tau as a function of g(fraction of the area visible at grazing angles).
              g(u) = sqrt(u) / (sqrt(u) + sqrt(1 - u)) refines both ends
     scale    w / alpha at the same widths; a plain number if it is constant
     widths   the meaning of two widths: "stretched" along x and y, "first" if alpha_y is ignored, "equal" if neither
@@ -243,7 +243,7 @@ def _meaning(ndf: HasDensity, density: Density, widths: list[float]) -> str:
         one = _shares(density, (x, x), x * s, float(AZIMUTHS[0]))
         for turn in AZIMUTHS:
             c, sin = float(np.cos(turn)), float(np.sin(turn))
-            # along this azimuth of the stretched surface slopes are longer and area elements larger
+            # along this azimuth of the stretched surface, slopes and area elements are larger
             longer = np.hypot(x * c, y * sin)
             there = _shares(density, (x, y), longer * s, float(np.arctan2(y * sin, x * c))) * (x * y / longer**2)
             stretched = stretched and bool(np.abs(there - unit).sum() < SAME * unit.sum())

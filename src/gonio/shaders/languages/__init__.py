@@ -1,4 +1,4 @@
-"""The shader languages, one file each. To add one, add a file to this folder, an entry point in a package, or a
+"""The shader languages, one file each. A new language is a file in this folder, an entry point of a package, or a
 registered class; see `gonio.members`.
 """
 

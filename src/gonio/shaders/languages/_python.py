@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from .base import Language
 
-# names of the file's own functions, which no local value may hide
+# names of the file's own functions, which local values must not shadow
 _OWN = """
     Vector vec2 vec3 vec4 dot mean max_component where sqrt exp log sin cos atan2 floor erf copysign isfinite minimum
     maximum lookup fetch np torch jax jnp math base64 zlib itertools NamedTuple DEFAULTS
@@ -17,7 +17,7 @@ _OWN = """
 
 
 class Python(Language):
-    """A Python file; `imports` provides the functions of its array library under the names of the vocabulary."""
+    """A Python file; `imports` provides the functions of its array library under the names used in `gonio.ops`."""
 
     suffix = ".py"
     standalone = True
@@ -26,7 +26,7 @@ class Python(Language):
     overloads = False
     native = frozenset()
     imports: ClassVar[str] = ""
-    decorator: ClassVar[str] = ""  # of the public functions
+    decorator: ClassVar[str] = ""  # decorator of the public functions
     choice = ("where({0}, {1}, {2})", "where({0}, {1}, {2})")
     words: ClassVar[Mapping[str, str]] = {
         **Language.words,

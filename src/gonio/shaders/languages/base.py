@@ -9,31 +9,31 @@ from ...members import Family, instances_of
 
 
 class Language:
-    """A shader language. The defaults are common to most languages; a subclass overrides those that differ.
+    """A shader language. The defaults apply to most languages; a subclass overrides those that differ.
 
     name, title, suffix  name for users, full name, and file suffix
     precision            sentence about precision in the head of a shader
-    types                type of a recording -> its name in the language, if different
-    words                operation -> template; {0}, {1} stand for the arguments
+    types                type in a recording -> name of the type in the language, if different
+    words                operation -> template; {0}, {1} are replaced by the arguments
     compare              operation -> template of a comparison of vectors; absent if the operators apply to vectors
-    choice               templates of `where`: for a scalar mask, and for a mask per component; {prefix} begins names
-    helpers              functions that the templates call: name -> lines, written where a text needs them
-    spread               template of a float {1} converted to a vector type {0}
+    choice               templates of `where` for a scalar mask and for a mask per component; {prefix} begins names
+    helpers              functions that the templates call: name -> lines, written only if a text needs them
+    spread               template that converts a float {1} to a vector type {0}
     spreads              such templates for individual types, if different
     truth                the words for false and true
     swizzles             whether `v.xy` selects several components
     mix                  name of linear interpolation
-    native               functions of the vocabulary that the language provides itself
+    native               functions of `gonio.ops` that the language itself provides
     reserved             reserved names
-    overloads            whether functions of one name may differ in their types
+    overloads            whether functions with the same name may differ in their types
     parameters_change    whether a function may assign to a parameter
     struct_literal       whether `Name(a, b)` constructs a struct inside an expression
-    array_literal        whether `array` is an expression, not only the value of a declaration
-    whole_members        whether braces that initialize a struct may name whole vectors and arrays
+    array_literal        whether `array` is an expression that is not limited to declarations
+    whole_members        whether braces that initialize a struct may contain whole vectors and arrays
     end                  the end of a statement
     single               whether all values are float32
-    standalone           whether a text is a file that runs by itself (`python_file.py`), not part of a program
-    groups               whether bindings of tables have groups; `binding` then takes the group as its last argument
+    standalone           whether a text is a self-contained file (`python_file.py`), not part of a program
+    groups               whether bindings of tables have groups; the group is then the last argument of `binding`
     methods              whether values have methods in place of operators (`method_writer.py`)
     templates            whether `a < b, c > d` is parsed as template arguments
     tables               the default format of table files, one of `table_files.FORMATS`
@@ -84,11 +84,11 @@ class Language:
     tables: ClassVar[str] = "raw"
 
     def type(self, name: str) -> str:
-        """Name of a type in the language."""
+        """The name of a type in the language."""
         return self.types.get(name, name)
 
     def word(self, name: str) -> str:
-        """The name, or a variant of it that the language does not reserve."""
+        """The name, or a variant of the name that the language does not reserve."""
         return PREFERRED.get(name, name + "_") if name in self.reserved else name
 
     def array_declaration(self, type_: str, name: str, count: int) -> tuple[str, str]:
@@ -108,7 +108,7 @@ class Language:
         return f"{type_} {name} = {text};"
 
     def changeable(self, line: str) -> str:
-        """The declaration of a local value that is assigned again later."""
+        """The declaration of a local value that is reassigned later."""
         return line
 
     def constant(self, name: str, text: str) -> str:
@@ -136,19 +136,19 @@ class Language:
         raise NotImplementedError(f"{type(self).__name__} has no binding")
 
     def fetch(self, table: str, places: list[str]) -> str:
-        """The expression of a texel, given its index along each axis."""
+        """The expression that reads a texel, given its index along each axis."""
         raise NotImplementedError(f"{type(self).__name__} has no fetch")
 
     def texel(self, table: str, places: list[str], channels: int, shape: Sequence[int], prefix: str) -> str:
-        """The expression of a texel's 1, 2 or 4 channels, given its index along each axis.
+        """The expression that reads the 1, 2 or 4 channels of a texel, given its index along each axis.
 
         shape   number of texels along each axis, in the order of `places`
-        prefix  start of the names of helpers
+        prefix  prefix of the names of helpers
         """
         return self.fetch(table, places) + {1: ".r", 2: ".rg", 4: ""}[channels]
 
     def offset(self, end: int, size: int) -> int:
-        """Offset of a field of `size` bytes in a uniform buffer, after data that ends at `end`."""
+        """The offset of a field of `size` bytes in a uniform buffer, after data that ends at `end`."""
         return end + -end % {4: 4, 8: 8, 12: 16, 16: 16}[size]
 
 

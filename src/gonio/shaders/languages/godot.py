@@ -17,7 +17,7 @@ class Godot(GLSL):
     name = "godot"
     title = "Godot 4"
     suffix = ".gdshaderinc"
-    precision = "float has 32 bits: mediump is not enough."
+    precision = "32-bit floats are required; mediump is not sufficient."
     reserved = GLSL.reserved | frozenset(_MORE.split())
     overloads = False
 

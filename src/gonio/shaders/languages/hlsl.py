@@ -34,7 +34,7 @@ class HLSL(Language):
     name = "hlsl"
     title = "HLSL (shader model 6)"
     suffix = ".hlsl"
-    precision = "float has 32 bits: min16float is not enough."
+    precision = "32-bit floats are required; min16float is not sufficient."
     types: ClassVar[Mapping[str, str]] = {
         "vec2": "float2",
         "vec3": "float3",
@@ -48,7 +48,7 @@ class HLSL(Language):
         "scaled": "{0} * asfloat((int({1}) + 127) << 23)",
     }
     choice = ("{0} ? {1} : {2}", "{prefix}choose({0}, {1}, {2})")
-    # `select` exists since HLSL 2021, in which ?: no longer selects component by component
+    # `select` was introduced in HLSL 2021, in which ?: no longer selects by component
     helpers: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "choose": (
             "float3 {name}(bool3 mask, float3 a, float3 b) {{",
@@ -84,5 +84,5 @@ class HLSL(Language):
         return f"{table}.Load(int{len(places) + 1}({', '.join(places)}, 0))"
 
     def offset(self, end: int, size: int) -> int:
-        """Packed, except that a vector does not cross a 16-byte row."""
+        """Fields are packed, but no vector crosses a 16-byte boundary."""
         return end if end % 16 + size <= 16 else end + -end % 16

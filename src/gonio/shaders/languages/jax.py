@@ -1,4 +1,4 @@
-"""JAX: a Python file of arrays, with gradients; `jax.jit` and `jax.grad` apply to its functions."""
+"""JAX: a Python file of arrays, with gradients; `jax.jit` and `jax.grad` can be applied to its functions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class JAX(Python):
 
     name = "jax"
     title = "Python with JAX"
-    precision = "Values have 64 bits if JAX has them switched on."
+    precision = "Values are in double precision if `jax_enable_x64` is set."
     imports = '''
 import jax
 import jax.numpy as jnp

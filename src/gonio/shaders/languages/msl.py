@@ -24,13 +24,13 @@ _RESERVED = """
 class MSL(Language):
     """The Metal shading language: a struct whose members are the textures and the functions.
 
-    Metal has no global textures. `Shader shader = {table_a, table_b};` then `shader.Conductor_eval(...)`.
+    Metal has no global textures. Write `Shader shader = {table_a, table_b};` and then `shader.Conductor_eval(...)`.
     """
 
     name = "msl"
     title = "Metal shading language 2.3"
     suffix = ".metal"
-    precision = "float has 32 bits: half is not enough. `using namespace metal;` stands above."
+    precision = "32-bit floats are required; half is not sufficient. Write `using namespace metal;` above."
     types: ClassVar[Mapping[str, str]] = {
         "vec2": "float2",
         "vec3": "float3",

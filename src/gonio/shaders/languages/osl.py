@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..table_files import FORMATS
 from .base import Language
 
-# keywords, words that the specification reserves, and the functions and closures of stdosl.h; parameters may hide the
+# keywords, words that the specification reserves, and the functions and closures of stdosl.h; parameters may shadow the
 # global variables P, N, u, v, ...
 _RESERVED = """
     and break closure color continue do else emit float for if illuminance illuminate int matrix normal not or output
@@ -40,7 +40,7 @@ class OSL(Language):
     name = "osl"
     title = "OSL"
     suffix = ".osl"
-    precision = "float has 32 bits."
+    precision = "All numbers are 32-bit floats."
     types: ClassVar[Mapping[str, str]] = {
         "bool": "int",
         "vec2": "vector2",
@@ -49,7 +49,7 @@ class OSL(Language):
         "bvec3": "vector",
     }
     truth = ("0", "1")
-    # renderers compute exp and atan2 by fast approximations, with errors of up to 232 units in the last place
+    # renderers compute exp and atan2 with fast approximations, whose errors are up to 232 units in the last place
     # (OpenImageIO, fmath.h); logb of any number and exp2 of an integer are exact
     words: ClassVar[Mapping[str, str]] = {
         **Language.words,
@@ -68,11 +68,11 @@ class OSL(Language):
         "not": "(1.0 - {0})",
     }
     choice = ("{0} ? {1} : {2}", "select({2}, {1}, {0})")
-    # a table's rows are stored twice, the second time in reverse order, so that the same texel is read whichever row of
-    # an image has t = 0 in a renderer (`table_files.py`)
+    # the rows of a table are stored twice, the second time in reverse order, so that the same texel is read regardless
+    # of which row of an image has t = 0 in a renderer (`table_files.py`)
     helpers: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "exponential": (
-            "// e^x = 2^n e^r: |r| <= log(2) / 2, by Taylor's series.",
+            "// e^x = 2^n e^r with |r| <= log(2) / 2, by Taylor series.",
             "float {name}(float x) {{",
             "    float n = clamp(floor(x * 1.442695 + 0.5), -126.0, 127.0);",
             "    float r = x - n * 0.693359375 + n * 0.00021219444;",
@@ -86,7 +86,7 @@ class OSL(Language):
             "}}",
         ),
         "arc_tangent": (
-            "// The angle of (x, y), by the polynomial of Cephes for |r| <= sqrt(2) - 1.",
+            "// The angle of (x, y), by the polynomial of the Cephes library for |r| <= sqrt(2) - 1.",
             "float {name}(float y, float x) {{",
             "    float high = max(abs(x), abs(y));",
             "    float t = high > 0.0 ? min(abs(x), abs(y)) / high : 0.0;",

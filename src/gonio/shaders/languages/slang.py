@@ -17,5 +17,5 @@ class Slang(HLSL):
     name = "slang"
     title = "Slang"
     suffix = ".slang"
-    precision = "float has 32 bits: half is not enough."
+    precision = "32-bit floats are required; half is not sufficient."
     reserved = HLSL.reserved | frozenset(_MORE.split())

@@ -10,7 +10,7 @@ class Torch(Python):
 
     name = "torch"
     title = "Python with PyTorch"
-    precision = "Values have the type and device of the directions; gradients by autograd."
+    precision = "Values have the type and device of the directions; autograd computes gradients."
     imports = '''
 import torch
 

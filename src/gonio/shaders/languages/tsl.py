@@ -23,12 +23,12 @@ _RESERVED = """
 
 
 class TSL(Language):
-    """A module for three.js, whose functions take and return nodes; structs are plain objects of nodes."""
+    """A module for three.js, whose functions accept and return nodes; structs are plain objects of nodes."""
 
     name = "tsl"
     title = "TSL (three.js)"
     suffix = ".js"
-    precision = "The renderer must compute at highp: 16 bits are not enough."
+    precision = "The renderer must compute at highp: 16 bits are not sufficient."
     words: ClassVar[Mapping[str, str]] = {
         **Language.words,
         "atan2": "atan({0}, {1})",

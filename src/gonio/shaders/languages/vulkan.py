@@ -1,4 +1,4 @@
-"""GLSL 4.50 as Vulkan accepts it: tables are bound by set and number."""
+"""GLSL 4.50 for Vulkan: tables are bound by set and number."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class VulkanGLSL(GLSL):
 
     name = "glsl-vulkan"
     title = "GLSL 4.50 (Vulkan)"
-    precision = "float has 32 bits."
+    precision = "All numbers are 32-bit floats."
     groups = True
 
     def binding(self, name: str, dimension: int, place: int, group: int = 0) -> list[str]:

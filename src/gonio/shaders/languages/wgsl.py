@@ -35,7 +35,7 @@ class WGSL(Language):
     name = "wgsl"
     title = "WGSL (WebGPU)"
     suffix = ".wgsl"
-    precision = "f32 throughout: f16 is not enough."
+    precision = "All numbers must be f32; f16 is not sufficient."
     types: ClassVar[Mapping[str, str]] = {
         "float": "f32",
         "int": "i32",

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from .emitter import Emitter, Value
 from .types import BOOL, FLOAT, INT, UINT, Type, vector
 
-# functions of floats, applied component by component: their numbers in GLSL.std.450
+# functions of floats that are applied to each component: their numbers in GLSL.std.450
 _FLOATS = {
     "acos": 17, "acosh": 23, "asin": 16, "asinh": 22, "atan": 18, "atanh": 24, "atan2": 25, "ceil": 9, "cos": 14,
     "cosh": 20, "degrees": 12, "exp": 27, "exp2": 29, "floor": 8, "fma": 50, "fract": 10, "inverseSqrt": 32,
@@ -15,7 +15,7 @@ _FLOATS = {
     "sqrt": 31, "step": 48, "tan": 15, "tanh": 21, "trunc": 3,
 }  # fmt: skip
 _COUNTS = {"atan2": 2, "fma": 3, "mix": 3, "pow": 2, "smoothstep": 3, "step": 2, "min": 2, "max": 2, "clamp": 3}
-# functions of floats, signed and unsigned integers
+# functions of floats, signed integers and unsigned integers
 _NUMBERS = {"abs": (4, 5, 0), "sign": (6, 7, 0), "min": (37, 39, 38), "max": (40, 42, 41), "clamp": (43, 45, 44)}
 # functions of vectors: number, count of vector arguments, whether the result is a scalar
 _GEOMETRIC = {
@@ -46,11 +46,11 @@ def refused(name: str) -> str:
         return f"a shadow, gather or query function of textures ({name})"
     if name in _BITS or name.startswith(("pack", "unpack")):
         return f"a bit operation ({name})"
-    return "the length of an array that only the buffer knows (arrayLength)" if name == "arrayLength" else ""
+    return "the length of a runtime-sized array (arrayLength)" if name == "arrayLength" else ""
 
 
 def called(emitter: Emitter, name: str, values: list[Value]) -> Value | None:
-    """The value of a call of a built-in function; None if there is none of that name."""
+    """The value of a call of a built-in function; None if there is no such function."""
     if name in _FLOATS or name in _NUMBERS:
         return _elementwise(emitter, name, values)
     if name in _GEOMETRIC:
@@ -68,11 +68,11 @@ def called(emitter: Emitter, name: str, values: list[Value]) -> Value | None:
 
 def _count(emitter: Emitter, name: str, values: list[Value], count: int) -> None:
     if len(values) != count:
-        raise emitter.error(f"{name} of {len(values)} values", f"it takes {count}")
+        raise emitter.error(f"{name} of {len(values)} values", f"{count} expected")
 
 
 def _shape(emitter: Emitter, name: str, values: list[Value]) -> Type:
-    """The type of a result: that of the vectors among the values, which must agree."""
+    """The type of a result, which is that of the vectors among the values; these must have the same type."""
     vectors = {value.type for value in values if value.type.kind == "vector"}
     if len(vectors) > 1 or any(value.type.kind == "matrix" for value in values):
         raise emitter.error(f"{name} of {', '.join(str(value.type) for value in values)}", "use vectors of one length")
@@ -90,7 +90,7 @@ def _elementwise(emitter: Emitter, name: str, values: list[Value]) -> Value:
     else:
         of_floats, signed, unsigned = _NUMBERS[name]
         number = of_floats if "float" in type.scalar.kind else unsigned if type.scalar == UINT else signed
-        if not number:  # abs of unsigned integers
+        if not number:  # abs of unsigned integers has no effect
             return values[0]
     return emitter.standard(number, type, *[value.id for value in values])
 
@@ -164,8 +164,8 @@ def _modf(emitter: Emitter, values: list[Value]) -> Value:
 
 
 def _bits(name: str) -> Callable[[Emitter, list[Value]], Value]:
-    """An operation on the bits of the first value, whose type the result has; the others are offset and count, or the
-    inserted bits before them."""
+    """An operation on the bits of the first value, which has the type of the result; the other values are offset and
+    count, which the inserted bits may precede."""
 
     def made(emitter: Emitter, values: list[Value]) -> Value:
         value = emitter.with_concrete_type(values[0])
@@ -197,8 +197,8 @@ def _texture(emitter: Emitter, name: str, values: list[Value]) -> Value:
     if name == "textureLoad":
         _count(emitter, name, values, 3)
         return emitter.emit("ImageFetch", color, texture.id, emitter.with_concrete_type(values[1]).id)
-    if len(values) not in (_MIPS[name], _MIPS[name] + 1):  # an additional one is an offset in texels
-        raise emitter.error(f"{name} of {len(values)} values", f"it takes {_MIPS[name]}")
+    if len(values) not in (_MIPS[name], _MIPS[name] + 1):  # an additional value is an offset in texels
+        raise emitter.error(f"{name} of {len(values)} values", f"{_MIPS[name]} expected")
     if len(values) > _MIPS[name]:
         raise emitter.error(f"{name} with an offset, or of an array of textures", "add it to the coordinates")
     return emitter.emit("ImageSample", color, texture.id, emitter.together([values[2]], name, floats=True)[0].id)

@@ -7,7 +7,7 @@ from .types import MATRICES, VECTORS, Type, matrix, vector
 
 
 def constructed(emitter: Emitter, type: Type, values: list[Value]) -> Value:
-    """type(values). Raises InputError for parts that do not fit."""
+    """type(values). Raises InputError if the parts do not match the type."""
     if not values:
         return emitter.zero(type)
     if type.kind == "vector":
@@ -29,7 +29,7 @@ def constructed(emitter: Emitter, type: Type, values: list[Value]) -> Value:
 
 
 def inferred(emitter: Emitter, name: str, values: list[Value]) -> Value:
-    """vec3(...), mat3x3(...) or array(...), with the scalar type of the values."""
+    """vec3(...), mat3x3(...) or array(...); the scalar type is that of the values."""
     if not values:
         raise emitter.error(f"{name}() without a type", f"{name}<f32>()" if name != "array" else "array<f32, 2>()")
     if name == "array":
@@ -44,7 +44,7 @@ def inferred(emitter: Emitter, name: str, values: list[Value]) -> Value:
 
 
 def _composed(emitter: Emitter, type: Type, values: list[Value]) -> Value:
-    emitter.type_id(type)  # refuses types that are too large
+    emitter.type_id(type)  # rejects types that are too large
     return emitter.emit("CompositeConstruct", type, *[value.id for value in values])
 
 

@@ -15,7 +15,7 @@ from ..values import Value as Number
 from ..values import leaves, refuse
 from .types import ABSTRACT_FLOAT, ABSTRACT_INT, BOOL, FLOAT, INT, UINT, Type, common, concrete
 
-MAX_CONSTANTS = 1 << 20  # numbers in all constants of a module
+MAX_CONSTANTS = 1 << 20  # total number of numbers in the constants of a module
 STANDARD = 1  # the id of the instruction set GLSL.std.450
 
 
@@ -27,7 +27,7 @@ class Value(NamedTuple):
 
 
 class Emitter:
-    """A module under construction, with the function that is being written.
+    """A module under construction, and the function that is being written.
 
     where, line  file and line of the text, for instructions and errors
     structs      name of a struct -> names and types of its members
@@ -39,7 +39,7 @@ class Emitter:
         self.structs: dict[str, tuple[tuple[str, ...], tuple[Type, ...]]] = {}
         self.function: Function | None = None
         self.block: Block | None = None
-        self.variables: list[Instruction] = []  # of the function
+        self.variables: list[Instruction] = []  # variables of the function
         self._last, self._leaves = STANDARD, 0
         self._ids: dict[Type, int] = {}
         self._constants: dict[tuple[Type, str], int] = {}
@@ -58,7 +58,7 @@ class Emitter:
     # ------------------------------------------------------------------ types and constants
 
     def type_id(self, type: Type) -> int:
-        """The id of a type in the module. Raises InputError for more numbers than a value may have."""
+        """The id of a type in the module. Raises InputError if it has more numbers than a value may have."""
         if type not in self._ids:
             parts = self.structs[type.name][1] if type.kind == "struct" else type.parts
             ids = tuple(self.type_id(part) for part in parts)
@@ -77,7 +77,7 @@ class Emitter:
         return self._ids[type]
 
     def constant(self, number: Number, type: Type) -> Value:
-        """A constant. Numbers of f32 are rounded to 32 bits, as the shader's are."""
+        """A constant. Numbers of type f32 are rounded to single precision, as in the shader."""
         with np.errstate(all="ignore"):
             number = self._rounded(number, type)
         if not isinstance(number, tuple):
@@ -110,7 +110,7 @@ class Emitter:
         return int(number) if type.kind == "abstract int" else number
 
     def zero(self, type: Type) -> Value:
-        """The value of a type with all numbers 0."""
+        """The value of a type in which all numbers are 0."""
         return self.constant(self.module.zero(self.type_id(type)), type)
 
     def known(self, value: Value) -> Number | None:
@@ -120,7 +120,7 @@ class Emitter:
     # ------------------------------------------------------------------ instructions
 
     def emit(self, name: str, type: Type, *operands: int, literals: int = 0) -> Value:
-        """An instruction's value, folded if all operands are constants.
+        """The value of an instruction, folded if all operands are constants.
 
         literals  how many of the last operands are literal numbers, not ids
         """
@@ -140,7 +140,7 @@ class Emitter:
         return self.emit("ExtInst", type, STANDARD, number, *operands)
 
     def always(self, name: str, type: Type, *operands: int) -> Value:
-        """An instruction's value, never folded."""
+        """The value of an instruction, never folded."""
         one = Instruction(name, self.type_id(type), self.fresh(), operands, self.line, self.where)
         self._append(one)
         return Value(one.result, type)
@@ -151,7 +151,7 @@ class Emitter:
 
     def _append(self, one: Instruction) -> None:
         if self.block is None:
-            raise self.error("not a constant expression", "outside functions numbers must be constants")
+            raise self.error("not a constant expression", "outside functions, numbers must be constants")
         self.block.instructions.append(one)
 
     def variable(self, type: Type) -> Value:
@@ -169,7 +169,7 @@ class Emitter:
     # ------------------------------------------------------------------ conversions
 
     def converted(self, value: Value, type: Type, what: str = "a value") -> Value:
-        """A value of a required type: literals are converted to it, other values must have it."""
+        """A value of a required type: literals are converted to the type, other values must have it."""
         if value.type == type:
             return value
         number = self.known(value)
@@ -197,7 +197,7 @@ class Emitter:
         return [self.converted(value, value.type.of(scalar)) for value in values]
 
     def cast(self, value: Value, scalar: Type) -> Value:
-        """f32(x), i32(x), u32(x) and bool(x), component by component."""
+        """f32(x), i32(x), u32(x) and bool(x), applied to each component."""
         source, target = value.type.scalar, value.type.of(scalar)
         if source == scalar:
             return value
@@ -216,7 +216,7 @@ class Emitter:
             return self.emit("ConvertIToF", target, value.id)
         if source == FLOAT:
             return self.emit("ConvertFToI", target, value.id)
-        return self.emit("CopyObject", target, value.id)  # integers that are not constant have no bits
+        return self.emit("CopyObject", target, value.id)  # integers that are not constant are floats without bits
 
 
 def _filled(type: Type, number: Any) -> Number:

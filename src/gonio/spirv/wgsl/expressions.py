@@ -18,7 +18,7 @@ _LETTERS = {letter: place for letters in ("xyzw", "rgba") for place, letter in e
 
 
 class Place(NamedTuple):
-    """A variable or a part of one: a pointer, the type it points to, and the components of a swizzle."""
+    """A variable or a part of one: a pointer, the type to which it points, and the components of a swizzle."""
 
     pointer: int
     type: Type
@@ -44,7 +44,7 @@ class Names(Protocol):
 
 
 class Expressions:
-    """Expressions of one file. `scopes` hold the declarations in a function, innermost last."""
+    """Expressions of one file. `scopes` contains the declarations in a function, innermost last."""
 
     def __init__(self, emitter: Emitter, names: Names, unit: Unit) -> None:
         self.emitter, self.names, self.unit = emitter, names, unit
@@ -101,7 +101,7 @@ class Expressions:
     # ------------------------------------------------------------------ variables
 
     def place(self, node: Expression) -> Place | None:
-        """The variable, or the part of one, that an expression names; None for values."""
+        """The variable, or the part of one, to which an expression refers; None for values."""
         self.emitter.line = node.line
         if isinstance(node, Name):
             named = self._named(node)
@@ -226,7 +226,7 @@ class Expressions:
         return operations.binary(self.emitter, sign, left, value)
 
     def _short(self, sign: str, left: Value, right: Expression, line: int) -> Value:
-        """`&&` or `||`, whose right side runs only where needed if it calls functions of the shader."""
+        """`&&` or `||`; if the right side calls functions of the shader, it runs only where needed."""
         emitter = self.emitter
         before, label = emitter.block, emitter.fresh()
         assert before is not None and emitter.function is not None
@@ -279,7 +279,7 @@ class Expressions:
 
     def _applied(self, name: str, signature: Signature, values: list[Value]) -> Value:
         if len(values) != len(signature.parameters):
-            raise self.emitter.error(f"'{name}' of {len(values)} values", f"it takes {len(signature.parameters)}")
+            raise self.emitter.error(f"'{name}' of {len(values)} values", f"{len(signature.parameters)} expected")
         given = [
             self.emitter.converted(value, type, f"an argument of '{name}'")
             for value, type in zip(values, signature.parameters, strict=True)

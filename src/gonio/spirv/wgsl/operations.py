@@ -1,4 +1,4 @@
-"""WGSL's operators: the instruction of each, by the types of its operands."""
+"""WGSL's operators: the instruction for each operator, by the types of the operands."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ from .syntax import (
 )
 from .tokens import MAX_NESTING, Words
 
-# binary operators, the weakest first; comparisons do not chain, which is not checked
+# binary operators, lowest precedence first; that comparisons cannot be chained is not checked
 _LEVELS = (("||",), ("&&",), ("|",), ("^",), ("&",), ("==", "!="), ("<", ">", "<=", ">="), ("<<", ">>"), ("+", "-"),
            ("*", "/", "%"))  # fmt: skip
 _STRENGTH = {sign: level for level, signs in enumerate(_LEVELS) for sign in signs}
@@ -132,7 +132,7 @@ class _Parser(Words):
 
     def declared(self, kind: str, line: int) -> Declared:
         space = ""
-        if kind == "var" and self.word.text == "<":  # not after a name, so it does not open a list of type arguments
+        if kind == "var" and self.word.text == "<":  # not after a name, so `<` does not open a list of type arguments
             self.take()
             space = self.name()
             while not self.accept(">"):
@@ -171,7 +171,7 @@ class _Parser(Words):
     # ------------------------------------------------------------------ expressions
 
     def expression(self, level: int = 0) -> Expression:
-        """An expression of binary operators at least as strong as `level`."""
+        """An expression whose binary operators have at least the precedence `level`."""
         left = self.unary()
         while (strength := _STRENGTH.get(self.sign(), -1)) >= level:
             rest = []
@@ -184,7 +184,7 @@ class _Parser(Words):
         return left
 
     def sign(self) -> str:
-        """The next operator, whose `>` are separate tokens."""
+        """The next operator; `>>` and `>=` consist of separate tokens."""
         word = self.word
         if word.kind != "sign":
             return ""
@@ -283,7 +283,7 @@ class _Parser(Words):
         return one
 
     def simple(self) -> Statement:
-        """A statement without a block: declaration, jump, assignment or call."""
+        """A statement without a block: a declaration, jump, assignment or call."""
         line, text = self.word.line, self.word.text
         if self.word.kind == "name":
             if text in ("let", "var", "const"):

@@ -1,9 +1,9 @@
-"""Bevy's directives in a WGSL text: #ifdef and related ones, #define, #import and #define_import_path.
+"""Bevy's directives in a WGSL text: #ifdef and related directives, #define, #import and #define_import_path.
 
     #import bevy_pbr::lighting as lighting
     #import bevy_pbr::{utils::PI, pbr_types::{A, B as C}}
 
-Omitted lines become empty, which preserves line numbers.
+Omitted lines are replaced by empty lines, so that line numbers are preserved.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from ..values import refuse
 
-MAX_DEPTH = 64  # of nested conditions
+MAX_DEPTH = 64  # depth of nested conditions
 _DIRECTIVE = re.compile(r"\s*#\s*([a-z_]+)\b(.*)", re.DOTALL)
 _VALUE = re.compile(r"#\{(\w+)\}|#([A-Z]\w*)")
 _PATH = re.compile(r'"[^"\n]+"(?:::\w+)*|\w+(?:::\w+)*')
@@ -29,7 +29,7 @@ _ORDERS: dict[str, Callable[[Any, Any], Any]] = {
 class Preprocessed:
     """The text after preprocessing.
 
-    path      the path by which others import it, "" if it has none
+    path      the path under which other files import it; "" if it has none
     imports   name in this file -> path
     lines     name in this file -> line of its import
     """
@@ -41,7 +41,8 @@ class Preprocessed:
 
 
 class _Conditions:
-    """The conditions around a line: for each, whether its branch is active, and whether an earlier one was."""
+    """The conditions around a line: for each, whether its branch is active, and whether an earlier branch was
+    active."""
 
     def __init__(self, defines: dict[str, str]) -> None:
         self.defines = defines
@@ -51,7 +52,7 @@ class _Conditions:
         return all(now for now, _ in self.stack)
 
     def take(self, word: str, rest: str, place: str) -> bool:
-        """Process a directive if it is a condition; returns whether it is."""
+        """Process a directive if it is a condition, and return whether it is one."""
         if word in ("ifdef", "ifndef", "if"):
             if len(self.stack) >= MAX_DEPTH:
                 raise refuse(f"more than {MAX_DEPTH} nested #if", "", place)
@@ -87,7 +88,7 @@ class _Conditions:
 
 
 def preprocessed(text: str, where: str, defines: Mapping[str, str]) -> Preprocessed:
-    """The text after its directives. Raises InputError, with file and line."""
+    """The text after its directives have been processed. Raises InputError, with file and line."""
     if "#" not in text:
         return Preprocessed(text)
     known, result = dict(defines), Preprocessed()
@@ -127,7 +128,7 @@ def _other(word: str, rest: str, defines: dict[str, str], result: Preprocessed, 
 
 
 def _expanded(line: str, defines: Mapping[str, str], place: str) -> str:
-    """A line with #NAME replaced by values; comments, in which a # may be part of a URL, are unchanged."""
+    """A line with #NAME replaced by its value; comments, in which a # may be part of a URL, are unchanged."""
     code, slashes, comment = line.partition("//")
     return _VALUE.sub(lambda one: _value(one, defines, place), code) + slashes + comment
 
@@ -141,7 +142,7 @@ def _value(match: re.Match[str], defines: Mapping[str, str], place: str) -> str:
 
 def _add(result: Preprocessed, text: str, line: int, place: str) -> None:
     """Add the names of an #import."""
-    listed = re.fullmatch(r"\s*([\w:]+)\s+(?!as\b)(\w+(?:\s*,\s*\w+)*)\s*", text)  # the old form, `path a, b`
+    listed = re.fullmatch(r"\s*([\w:]+)\s+(?!as\b)(\w+(?:\s*,\s*\w+)*)\s*", text)  # the old form `path a, b`
     text = f"{listed[1]}::{{{listed[2]}}}" if listed else text
     words = re.findall(r'"[^"]*"|\w+|::|[{},]', text)
     prefixes, parts, name = [""], list[str](), ""

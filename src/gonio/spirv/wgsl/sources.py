@@ -1,4 +1,4 @@
-"""The files of a WGSL shader: its own, and those that it imports by Bevy's #import, only from named folders."""
+"""The files of a WGSL shader: its own, and those that it imports by Bevy's #import, only from specified folders."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .preprocessor import preprocessed
 from .syntax import Assertion, Declaration
 
 MAX_FILES = 256
-MAX_TEXT = 4 << 20  # characters in all files
-MAX_FOLDER = 4096  # entries of a folder that is searched for imports
+MAX_TEXT = 4 << 20  # total number of characters in all files
+MAX_FOLDER = 4096  # number of entries of a folder that is searched for imports
 _IMPORT_PATH = re.compile(r"^[ \t]*#[ \t]*define_import_path[ \t]+([\w:]+)", re.MULTILINE)
 
 
 @dataclass
 class Unit:
-    """One file: its declarations, and its imports, name -> path."""
+    """One file: its declarations, and its imports as name -> path."""
 
     where: str
     path: str
@@ -45,7 +45,7 @@ class Sources:
             self._known[self.main.path] = self.main
 
     def find(self, unit: Unit, name: str, line: int) -> tuple[Unit, Declaration] | None:
-        """The declaration that a name has in a file, None if there is none; `a::b` is resolved by the file's imports.
+        """The declaration of a name in a file; None if there is none. `a::b` is resolved through the file's imports.
 
         Raises InputError, with file and line, for an import that is not found.
         """

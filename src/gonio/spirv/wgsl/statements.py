@@ -30,7 +30,7 @@ class Body(Expressions):
     def __init__(self, emitter: Emitter, names: Names, unit: Unit, signature: Signature) -> None:
         super().__init__(emitter, names, unit)
         self.signature = signature
-        self.targets: list[tuple[int, int | None]] = []  # labels for break and continue, innermost last
+        self.targets: list[tuple[int, int | None]] = []  # labels of break and continue, innermost last
 
     def write(self, function: Function) -> ModuleFunction:
         """The function's blocks."""
@@ -186,7 +186,7 @@ class Body(Expressions):
             emitter.do("Branch", body)
         emitter.start(body)
         self.targets.append((end, after))
-        self.scopes.append({})  # declarations of the body are visible in the continuing part
+        self.scopes.append({})  # declarations in the body are visible in the `continuing` block
         for one in node.body.statements:
             self.run(one)
         self.targets.pop()
@@ -230,7 +230,7 @@ class Body(Expressions):
 
 
 def _completes(node: Statement) -> bool:
-    """Whether the end of a statement can be reached, whatever its conditions are."""
+    """Whether the end of a statement can be reached for any values of its conditions."""
     if isinstance(node, Block):
         return all(map(_completes, node.statements))
     if isinstance(node, If):
@@ -245,7 +245,7 @@ def _completes(node: Statement) -> bool:
 
 
 def _breaks(node: Statement) -> bool:
-    """Whether a statement contains a `break` out of the loop or switch around it."""
+    """Whether a statement contains a `break` that leaves the surrounding loop or switch."""
     if isinstance(node, Block):
         return any(map(_breaks, node.statements))
     if isinstance(node, If):

@@ -26,7 +26,7 @@ class Literal(Expression):
 
 @dataclass(slots=True)
 class Name(Expression):
-    """A name, possibly `a::b`, with the arguments of a type in `<>`."""
+    """A name, possibly `a::b`, with type arguments in `<>`."""
 
     text: str
     arguments: list[Expression] = field(default_factory=list)
@@ -66,7 +66,8 @@ class Unary(Expression):
 
 @dataclass(slots=True)
 class Chain(Expression):
-    """A left-associative chain of binary operations, (first sign right) sign right ..., which keeps long sums flat."""
+    """A left-associative chain of binary operations, (first sign right) sign right ..., so that long sums are not
+    nested."""
 
     first: Expression
     rest: list[tuple[str, Expression, int]]  # sign, right operand, line
@@ -88,7 +89,7 @@ class Block(Statement):
 class Declared(Statement):
     """let, var, const or override, inside or outside a function.
 
-    space  "uniform", "private", ..., for variables in module scope
+    space  "uniform", "private", ..., for module-scope variables
     """
 
     kind: str
@@ -123,7 +124,8 @@ class If(Statement):
 
 @dataclass(slots=True)
 class Loop(Statement):
-    """Any loop: initial statement, condition, body, continuing statements, and the condition that then ends it."""
+    """Any loop: initial statement, condition, body, continuing statements, and the condition at their end that ends
+    it."""
 
     start: Statement | None
     condition: Expression | None
@@ -134,7 +136,7 @@ class Loop(Statement):
 
 @dataclass(slots=True)
 class Switch(Statement):
-    """switch: (selectors, block); None as a selector is `default`."""
+    """switch: (selectors, block); the selector None means `default`."""
 
     selector: Expression
     cases: list[tuple[list[Expression | None], Block]]
@@ -164,7 +166,7 @@ class Parameter(Node):
 
 @dataclass(slots=True)
 class Function(Node):
-    """A function; `entry` if it is a stage's entry point."""
+    """A function; `entry` is true for the entry point of a stage."""
 
     name: str
     parameters: list[Parameter]

@@ -15,8 +15,8 @@ from typing import NamedTuple
 from ...errors import InputError
 from ..values import refuse
 
-MAX_TOKENS = 400_000  # of a file
-MAX_NESTING = 64  # nested brackets and blocks
+MAX_TOKENS = 400_000  # number of tokens of a file
+MAX_NESTING = 64  # depth of nested brackets and blocks
 
 _TOKEN = re.compile(
     r"""(?P<space>[ \t\r\f\v\u0085\u200e\u200f\u2028\u2029]+|//[^\n]*)
@@ -44,7 +44,7 @@ class Token(NamedTuple):
 
 
 def tokens(text: str, where: str) -> list[Token]:
-    """The tokens of a text. Raises InputError, with file and line, for invalid characters and too many tokens."""
+    """The tokens of a text. Raises InputError, with file and line, for invalid characters and for too many tokens."""
     result: list[Token] = []
     for token in _words(text, where):
         result.append(token)
@@ -68,12 +68,12 @@ def _words(text: str, where: str) -> Iterator[Token]:
             at, more = _after_comment(text, at, f"{where}:{line}")
             line += more
         elif kind != "space":
-            for word in (">", "=") if match[0] == ">=" else (match[0],):  # `array<f32>=` closes a list
+            for word in (">", "=") if match[0] == ">=" else (match[0],):  # `>=` in `array<f32>=` closes a list
                 yield Token(kind, word, line, at < len(text) and (text[at] in ">=" or word != match[0]))
 
 
 def _after_comment(text: str, at: int, where: str) -> tuple[int, int]:
-    """The position after a block comment, and the number of line ends in it; comments nest."""
+    """The position after a block comment, and the number of line ends in the comment; comments can be nested."""
     depth, lines = 1, 0
     while depth:
         match = _COMMENT.search(text, at)
@@ -111,7 +111,7 @@ def _mark_lists(result: list[Token]) -> None:
 
 
 class Words:
-    """The tokens of a text, consumed one by one."""
+    """The tokens of a text, consumed one at a time."""
 
     def __init__(self, text: str, where: str) -> None:
         self.where, self.words, self.at, self.depth = where, tokens(text, where), 0, 0
@@ -148,4 +148,4 @@ class Words:
         self.depth += 1
         if self.depth > MAX_NESTING:
             what = f"more than {MAX_NESTING} nested brackets or blocks"
-            raise refuse(what, "name the parts by let", f"{self.where}:{self.word.line}")
+            raise refuse(what, "name the parts with let", f"{self.where}:{self.word.line}")

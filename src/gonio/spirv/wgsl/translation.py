@@ -1,10 +1,11 @@
-"""A WGSL shader as a module, in which declarations outside functions are translated when first used.
+"""A WGSL shader as a module; declarations outside functions are translated when they are first used.
 
-All functions of the shader's own file are translated, those of imported files when they are called. A function with
-unsupported constructs is refused only where it is called, so that a file may contain any.
+All functions of the shader's own file are translated; functions of imported files are translated when they are called.
+A function with unsupported constructs is rejected only if it is called, so that a file may contain such functions.
 
-An `override` of type f32 without a value in `defines` is a uniform with a default; one that depends on such an override
-is computed before any function runs. Other overrides are constants, since loops and array lengths may depend on them.
+An `override` of type f32 without a value in `defines` is a uniform with a default; an override that depends on such an
+override is computed before any function runs. Other overrides are constants, because loops and array lengths may depend
+on them.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from .statements import Body
 from .syntax import Alias, Assign, Block, Declared, Expression, Function, Name, Struct, names_in
 from .types import FLOAT, MATRICES, NAMED, REFUSED, TEXTURES, VECTORS, VOID, Type, concrete, matrix, vector
 
-MAX_INSIDE = 32  # depth of declarations that depend on one another
+MAX_INSIDE = 32  # depth of declarations that depend on each other
 # SPIR-V's storage classes
 _SPACES = {"uniform": 2, "storage": 12, "push_constant": 9, "immediate": 9, "private": 6, "": 0}
 
@@ -35,7 +36,7 @@ def translated(
     """The module of a WGSL text.
 
     where    name of the file, for messages
-    defines  names for #ifdef, and values of `override`
+    defines  names for #ifdef, and values of overrides
     folders  folders from which #import may read
     read     receives the files that are imported
     Raises InputError, with file and line.
@@ -47,7 +48,7 @@ def translated(
             read += sources.read
         return module
     except RecursionError:
-        raise refuse("expressions are nested too deeply", "name the parts by let", where) from None
+        raise refuse("expressions are nested too deeply", "name the parts with let", where) from None
 
 
 class _Translation:
@@ -70,7 +71,7 @@ class _Translation:
                     self.signature(main, one.name, one.line)
                 elif isinstance(one, Declared) and one.kind == "var":
                     self.value(main, one.name, one.line)
-            except InputError:  # refused only where it is used
+            except InputError:  # rejected only where it is used
                 continue
         for assertion in main.assertions:
             held = Expressions(self.emitter, self, main).value(assertion.condition)
@@ -95,10 +96,10 @@ class _Translation:
             made.parameters.append((id, self.emitter.type_id(type)))
         return made
 
-    # ------------------------------------------------------------------ look-ups by expressions
+    # ------------------------------------------------------------------ lookups by expressions
 
     def value(self, unit: Unit, name: str, line: int) -> Value | Place | None:
-        """The constant or variable of a name; None if there is none."""
+        """The constant or variable with a name; None if there is none."""
         home, declared = self.sources.find(unit, name, line) or (unit, None)
         if not isinstance(declared, Declared):
             return None
@@ -110,7 +111,7 @@ class _Translation:
         return self._values[key]
 
     def signature(self, unit: Unit, name: str, line: int) -> Signature | None:
-        """The function of a name; None if there is none."""
+        """The function with a name; None if there is none."""
         home, function = self.sources.find(unit, name, line) or (unit, None)
         if not isinstance(function, Function):
             return None
@@ -126,7 +127,7 @@ class _Translation:
         return self._signatures[key]
 
     def type(self, unit: Unit, expression: Expression) -> Type | None:
-        """The type that an expression names; None if it does not name one."""
+        """The type to which an expression refers; None if it does not refer to a type."""
         if not isinstance(expression, Name):
             return None
         name, arguments = expression.text, expression.arguments
@@ -223,7 +224,7 @@ class _Translation:
         return Place(id, FLOAT)
 
     def _derived(self, unit: Unit, one: Declared) -> bool:
-        """Whether an override is not given and depends on one that is a uniform."""
+        """Whether an override has no given value and depends on an override that is a uniform."""
         if one.kind != "override" or one.value is None or one.name in self.sources.defines:
             return False
         return any(isinstance(self.value(unit, name, one.line), Place) for name in sorted(names_in(one.value)))
@@ -274,7 +275,8 @@ class _Translation:
 
 
 class _Entered:
-    """A translation: refuses declarations that depend on themselves, and restores the place for messages."""
+    """The translation of a declaration: rejects declarations that depend on themselves, and restores the location for
+    messages."""
 
     def __init__(self, translation: _Translation, key: tuple[str, str], unit: Unit, line: int) -> None:
         self.translation, self.key, self.unit, self.line = translation, key, unit, line
@@ -286,7 +288,7 @@ class _Entered:
         if self.key in inside:
             raise refuse(f"'{self.key[1]}' depends on itself", "", place)
         if len(inside) >= MAX_INSIDE:
-            raise refuse(f"more than {MAX_INSIDE} declarations that depend on one another", "", place)
+            raise refuse(f"more than {MAX_INSIDE} declarations that depend on each other", "", place)
         inside.append(self.key)
         emitter = self.translation.emitter
         emitter.where, emitter.line, emitter.block = self.unit.where, self.line, None

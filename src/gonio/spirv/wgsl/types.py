@@ -1,4 +1,4 @@
-"""WGSL's types, and the conversion of literals to the types of other operands."""
+"""WGSL's types, and the conversion of literals to the types of the other operands."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class Type(NamedTuple):
 
     kind    "float", "int", "uint", "bool", "abstract float", "abstract int", "vector", "matrix", "array", "struct",
             "pointer", "texture", "sampler" or "void"
-    parts   the types of components, columns or items, or of the target of a pointer
+    parts   the types of the components, columns or items, or of the target of a pointer
     length  number of components, columns or items; dimensions of a texture
     name    name of a struct
     """
@@ -27,11 +27,11 @@ class Type(NamedTuple):
 
     @property
     def numbers(self) -> bool:
-        """Whether it is a scalar, vector or matrix."""
+        """Whether the type is a scalar, vector or matrix."""
         return self.scalar.kind in _SCALARS
 
     def of(self, scalar: Type) -> Type:
-        """The same shape with another scalar type."""
+        """The type with the same shape and another scalar type."""
         return self._replace(parts=(self.parts[0].of(scalar),)) if self.kind in ("vector", "matrix") else scalar
 
     def __str__(self) -> str:
@@ -77,7 +77,7 @@ def _short() -> dict[str, Type]:
 
 NAMED = SCALARS | _short() | {"sampler": SAMPLER}
 TEXTURES = {"texture_1d": 1, "texture_2d": 2, "texture_3d": 3}
-# names that need type arguments, or have them inferred from the values of a constructor
+# names that require type arguments, which a constructor may infer from its values
 VECTORS = {f"vec{n}": n for n in (2, 3, 4)}
 MATRICES = {f"mat{c}x{r}": (c, r) for c in (2, 3, 4) for r in (2, 3, 4)}
 

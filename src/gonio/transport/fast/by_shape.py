@@ -1,8 +1,8 @@
-"""One material instead of thousands that differ in numeric parameters only.
+"""Replace thousands of materials that differ only in numeric parameters by one material.
 
-Dr.Jit traces every material of a scene, which takes 0.2 ms per material and vertex of the program. Where many shapes
-have materials of one structure, one plugin stands for all of them, and each parameter that differs is a texture indexed
-by the shape that was hit.
+Dr.Jit traces the code of every material of a scene, which takes 0.2 ms per material and vertex. If many shapes have
+materials with the same structure, one plugin replaces all of these, and each parameter that differs is a texture, which
+is indexed by the shape that was hit.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Color, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
 
 Numbers: TypeAlias = tuple[float, ...]  # a number, or red, green and blue
-Place: TypeAlias = tuple[str, ...]  # path of a property: the names of the enclosing plugins, then its own
+Place: TypeAlias = tuple[str, ...]  # path of a property: the names of the enclosing plugins, then that of the property
 
 PLUGIN = "gonio_by_shape"
 _NO_TEXTURE = ("absorption", "priority")  # properties of the interior, which cannot be textures
@@ -29,11 +29,11 @@ _NO_TEXTURE = ("absorption", "priority")  # properties of the interior, which ca
 
 @dataclass
 class Group:
-    """Materials of one structure.
+    """Materials with the same structure.
 
-    prototype  the plugin of the first material
+    prototype  plugin of the first material
     rows       values of the properties that may differ, one mapping per material
-    shapes     index of each shape's material, by the shape's name
+    shapes     index of the material of each shape, by the name of the shape
     """
 
     prototype: PluginDict
@@ -42,7 +42,7 @@ class Group:
     textures: dict[Place, Texture] = field(default_factory=dict)
 
     def plugin(self, mi: ModuleType) -> PluginDict:
-        """One material for all shapes of the group; call `bind` once the shapes are in a scene."""
+        """One material for all shapes of the group. `bind` must be called when the shapes are in a scene."""
         _register(mi)
         for place, first in self.rows[0].items():
             if any(row[place] != first for row in self.rows):
@@ -52,7 +52,10 @@ class Group:
         return _replaced(self.prototype, self.textures)
 
     def bind(self, numbers: Mapping[str, int]) -> None:
-        """Bind the textures; `numbers` maps each shape's name to the number that identifies the shape in kernels."""
+        """Bind the textures to shapes.
+
+        numbers  the number that identifies each shape in kernels, by the name of the shape
+        """
         size = 1 + max(numbers.values())
         row = np.zeros(size, np.intp)
         row[[numbers[name] for name in self.shapes]] = list(self.shapes.values())
@@ -61,7 +64,7 @@ class Group:
 
 
 def structure(plugin: PluginDict) -> Hashable:
-    """A key that is equal for plugins that differ only in numbers; None for a plugin with an image or the like."""
+    """A key that is equal for plugins that differ only in numbers; None for plugins with other data, such as images."""
     parts: list[Hashable] = []
     for name, value in plugin.items():
         if isinstance(value, dict) and value["type"] != "rgb":
@@ -77,7 +80,7 @@ def structure(plugin: PluginDict) -> Hashable:
 
 
 def properties(plugin: PluginDict, outer: Place = ()) -> Iterator[tuple[Place, Numbers]]:
-    """The numbers in which plugins of one structure may differ."""
+    """The numbers in which plugins with the same structure may differ."""
     for name, value in plugin.items():
         result = None if name in _NO_TEXTURE else _numbers(value)
         if result is not None:
@@ -87,7 +90,7 @@ def properties(plugin: PluginDict, outer: Place = ()) -> Iterator[tuple[Place, N
 
 
 def bind(mi: ModuleType, scene: Scene, groups: Iterable[Group]) -> None:
-    """Bind groups to the shapes of a scene."""
+    """Bind the textures of all groups to the shapes of a scene."""
     numbers = np.array(dr.reinterpret_array(mi.UInt32, scene.shapes_dr()))
     named = {shape.id(): int(number) for shape, number in zip(scene.shapes(), numbers, strict=True)}
     for group in groups:
@@ -127,7 +130,7 @@ def _texture_class(mi: ModuleType) -> OfVariant:
     base: OfVariant = mi.Texture
 
     class ByShape(base):
-        """A number, or red, green and blue, per shape."""
+        """A texture with one number or one color per shape."""
 
         def __init__(self, props: Properties) -> None:
             base.__init__(self, props)
@@ -139,11 +142,11 @@ def _texture_class(mi: ModuleType) -> OfVariant:
 
         @property
         def span(self) -> NDArray[np.float64]:
-            """The smallest and the largest values, (2, 1) or (2, 3)."""
+            """The smallest and the largest value of each channel, (2, 1) or (2, 3)."""
             return np.array([self.rows.min(axis=0), self.rows.max(axis=0)])
 
         def bind(self, row: NDArray[np.intp]) -> None:
-            """Set the row of each shape, indexed by the shape's number in kernels."""
+            """Set the row of each shape, indexed by the number of the shape in kernels."""
             self.table = own(mi.Float, self.rows[row].ravel().astype(np.float32))
 
         def is_spatially_varying(self) -> bool:

@@ -1,11 +1,12 @@
-"""Intersections of rays with a few simple shapes, in the kernel itself.
+"""Intersect rays with a few simple shapes in the kernel.
 
-A call to Embree from a kernel, with its callbacks for each sphere, takes longer than the formulas for a dozen spheres
-and flat shapes, which are vectorized like the rest of the kernel. Scenes of balls on a floor render 1.4 to 1.8 times as
-fast this way. Scenes with more shapes, or with shapes of other kinds, use Mitsuba.
+A call of Embree from a kernel, with callbacks for each sphere, takes longer than evaluating the formulas for a dozen
+spheres and flat shapes, which are vectorized like the rest of the kernel. Scenes of balls on a floor render 1.4 to 1.8
+times as fast with this method. For scenes with more shapes or with shapes of other kinds, Mitsuba is used.
 
-Rectangles, disks and triangles share one formula: the ray intersects the plane z = 0 of the shape's frame, and the
-point (x, y) there is inside or not. Two triangles of a mesh that form a parallelogram are one shape.
+Rectangles, disks and triangles are intersected by one formula: the ray is intersected with the plane z = 0 of the frame
+of the shape, and the point (x, y) is tested against the outline. Two triangles of a mesh that form a parallelogram are
+treated as one shape.
 """
 
 from __future__ import annotations
@@ -22,43 +23,44 @@ from numpy.typing import NDArray
 from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Float, Hit, Mask, Point, Ray, Scene, Shape, UInt
 
-# Largest total cost of the shapes, where a sphere costs 1. Embree, which intersects triangles itself and calls Mitsuba
-# for each sphere, is as fast as 40 spheres (for which a kernel takes 0.6 s longer to compile) or 11 flat shapes.
+# The maximum total cost of the shapes, where a sphere costs 1. Embree intersects triangles itself and calls Mitsuba for
+# each sphere. It is as fast as this module with 40 spheres, for which compilation takes 0.6 s longer, or 11 flat
+# shapes.
 MAX_COST = 24
 COST_OF_FLAT = 2
 
-# float32 must distinguish a sphere's far side from the side that a ray has just left: the distance from the surface is
-# known to some 2e-7 of the radius and of the center's distance from the origin, and a ray starts off the surface by
-# 9e-5 (unit + |p|), see `Offsets`. If (radius + distance from the origin) / (unit + |p|) exceeds this ratio, Mitsuba
-# traces the sphere, in 64 bits.
+# With float32, the far side of a sphere must be distinguishable from the side that a ray has just left. The error of
+# the distance from the surface is some 2e-7 of the radius and of the center's distance from the origin, and the offset
+# of a ray from the surface is 9e-5 (unit + |p|), see `Offsets`. If (radius + distance from the origin) / (unit + |p|)
+# exceeds this ratio, Mitsuba intersects the sphere, in double precision.
 MAX_SPHERE = 50.0
 
 MESHES = ("Mesh", "OBJMesh", "PLYMesh", "SerializedMesh", "Cube")
-FLAT = 1e-5  # largest offset of a parallelogram's fourth corner, relative to its sides
+FLAT = 1e-5  # largest deviation of the fourth corner of a parallelogram, relative to its sides
 
 Matrix = NDArray[np.float64]
 Inside = Callable[[Float, Float], Mask]
-Row = list[Float]  # of a 3 x 4 matrix
+Row = list[Float]  # a row of a 3 x 4 matrix
 
 
-# Faces of a mesh, one or two (below and above the diagonal x + y = 1), each with the weights of its second and third
-# corner as functions a + b x + c y.
+# One or two faces of a mesh (below and above the diagonal x + y = 1), each with the barycentric weights of its second
+# and third corner as functions a + b x + c y.
 Faces = tuple[tuple[int, tuple[tuple[int, int, int], ...]], ...]
 
 
 @dataclass
 class Sphere:
-    shape: int  # index in the scene
+    shape: int  # index of the shape in the scene
     center: list[float]
     radius: float
 
 
 @dataclass
 class Flat:
-    """A part of a plane: the first three rows of the matrix that transforms the plane into z = 0."""
+    """A part of a plane, given by the first three rows of the matrix that transforms the plane to z = 0."""
 
     shape: int
-    kind: str  # of `_INSIDE`
+    kind: str  # a key of `_INSIDE`
     rows: list[list[float]]
     faces: Faces = ()
 
@@ -72,17 +74,20 @@ _INSIDE: dict[str, Inside] = {
 
 
 class Inline:
-    """The shapes of a scene at construction time; use `of`, which returns None for shapes that are not supported."""
+    """The shapes that a scene has when this object is constructed.
+
+    To construct it, call `of`, which returns None if the shapes are not supported.
+    """
 
     def __init__(self, mi: ModuleType, scene: Scene, spheres: list[Sphere], flats: list[Flat]):
         self.mi = mi
-        # Mitsuba's order of shapes is random: neither the kernel nor a tie between two shapes may depend on it.
+        # Mitsuba's order of shapes is random, so neither the kernel nor a tie between two shapes may depend on it.
         flats.sort(key=lambda f: (f.kind, f.faces, f.rows))
         spheres.sort(key=lambda s: (s.center, s.radius))
         parts = [flat.shape for flat in flats] + [sphere.shape for sphere in spheres]
-        self.shapes = dr.gather(mi.ShapePtr, scene.shapes_dr(), mi.UInt32(parts))  # of each part
+        self.shapes = dr.gather(mi.ShapePtr, scene.shapes_dr(), mi.UInt32(parts))  # the shape of each part
         dr.eval(self.shapes)
-        # One array: kernels depend on the order in which the arrays that they read were created.
+        # All numbers are in one array, because kernels depend on the order in which their arrays were created.
         numbers = [n for s in spheres for n in (*s.center, s.radius)]
         numbers += [n for flat in flats for row in flat.rows for n in row]
         table = own(mi.Float, np.array(numbers, np.float32))
@@ -92,10 +97,11 @@ class Inline:
 
     @staticmethod
     def of(mi: ModuleType, scene: Scene, to_world: Callable[[Shape], list[float]], unit: float) -> Inline | None:
-        """The shapes of a scene, or None if Mitsuba must trace them: many shapes, unsupported ones, or any on a GPU,
-        which has ray tracing hardware.
+        """The shapes of a scene, or None if Mitsuba must intersect them.
 
-        to_world  returns a shape's placement, 16 numbers row by row
+        This is the case if there are many shapes or unsupported ones, and on a GPU, which has ray tracing hardware.
+
+        to_world  function that returns the placement of a shape, 16 numbers row by row
         unit      `Offsets.unit` of the scene
         """
         shapes = scene.shapes()
@@ -121,7 +127,7 @@ class Inline:
         return Inline(mi, scene, spheres, flats) if spheres or flats else None
 
     def nearest(self, ray: Ray, active: Mask) -> Hit:
-        """The first intersection of a ray."""
+        """The first intersection of a ray with the shapes."""
         mi = self.mi
         best = dr.select(active, mi.Float(ray.maxt), 0)
         count = len(self.flats) + len(self.spheres)
@@ -141,7 +147,7 @@ class Inline:
         return hit
 
     def blocked(self, ray: Ray, active: Mask) -> Mask:
-        """Whether the ray hits anything."""
+        """Whether a ray hits any shape."""
         mi = self.mi
         most = dr.select(active, mi.Float(ray.maxt), 0)
         hits = mi.Bool(False)
@@ -152,10 +158,10 @@ class Inline:
         return hits
 
     def _on_sphere(self, center: Point, radius: Float, ray: Ray, most: Float) -> tuple[Float, Mask]:
-        """(distance, whether it is between 0 and `most`).
+        """The distance of the nearest intersection with a sphere, and whether it is between 0 and `most`.
 
-        The discriminant uses the ray's distance from the center, and the nearer root is a quotient: neither subtracts
-        nearly equal numbers (Haines2019).
+        The discriminant is computed from the distance between the ray and the center, and the nearer root as a
+        quotient, so nearly equal numbers are not subtracted (Haines2019).
         """
         away, square = center - ray.o, dr.square(radius)
         along = dr.dot(away, ray.d)
@@ -167,7 +173,10 @@ class Inline:
         return t, (discriminant >= 0) & (t > 0) & (t < most)
 
     def _on_flat(self, flat: Flat, rows: list[Row], ray: Ray, most: Float) -> tuple[Float, Float, Float, Mask]:
-        """(distance, local coordinates x, y, whether the point is inside and the distance between 0 and `most`)."""
+        """The distance of the intersection with a flat shape, its local coordinates x and y, and whether it is valid.
+
+        It is valid if the point is inside the shape and the distance is between 0 and `most`.
+        """
         across, along, up = rows
         t = -_at(up, ray.o) / dr.dot(self.mi.Vector3f(*up[:3]), ray.d)
         point = dr.fma(ray.d, t, ray.o)
@@ -175,8 +184,11 @@ class Inline:
         return t, x, y, _INSIDE[flat.kind](x, y) & (t > 0) & (t < most)
 
     def _placed(self, flat: Flat, x: Float, y: Float, hits: Mask, face: UInt, place: Point) -> tuple[UInt, Point]:
-        """Face index and uv as Mitsuba defines them: for meshes, the weights of the second and third corner; for disks,
-        x and y. For other shapes they follow from the point (`Surfaces`)."""
+        """The face index and uv of a hit, as Mitsuba defines them.
+
+        For meshes, uv are the barycentric weights of the second and third corner; for disks, they are x and y. For
+        other shapes, they are computed from the point (`Surfaces`).
+        """
         mi = self.mi
         if flat.kind == "disk":
             return face, dr.select(hits, mi.Point2f(x, y), place)
@@ -198,14 +210,14 @@ def _cost(shape: Shape) -> int:
 
 
 def _flat(shape: int, kind: str, frame: Matrix, faces: Faces = ()) -> Flat | None:
-    """The part of the plane z = 0 of a frame (4 x 4, to world space); None if it is degenerate."""
+    """The part of the plane z = 0 in a given frame, a 4 x 4 matrix to world space; None if the frame is degenerate."""
     across, along, up = frame[:3, :3].T
     normal = np.cross(across, along)
     if not (size := float(np.linalg.norm(normal))) > 0.0:
         return None
     oblique = abs(up @ normal) <= (1.0 - FLAT) * np.linalg.norm(up) * size
     if kind == "disk" and (oblique or abs(across @ along) > FLAT * size):
-        return None  # Mitsuba treats disks with oblique axes differently
+        return None  # Mitsuba treats disks with non-perpendicular axes differently
     frame = frame.copy()
     frame[:3, 2] = normal / np.sqrt(size)  # scaled like the other axes
     with np.errstate(all="ignore"):
@@ -216,7 +228,7 @@ def _flat(shape: int, kind: str, frame: Matrix, faces: Faces = ()) -> Flat | Non
 
 
 def _of_mesh(shape: int, mesh: Shape) -> Iterator[Flat]:
-    """The triangles of a mesh; two that form a parallelogram are one shape. Degenerate triangles are omitted."""
+    """The triangles of a mesh. Two triangles that form a parallelogram are one shape; degenerate ones are omitted."""
     corners = np.array(mesh.vertex_positions_buffer(), float).reshape(-1, 3)
     faces = np.array(mesh.faces_buffer()).reshape(-1, 3).astype(int)
     left = list(range(len(faces)))
@@ -242,8 +254,11 @@ def _of_mesh(shape: int, mesh: Shape) -> Iterator[Flat]:
 def _partners(
     corners: Matrix, faces: NDArray[np.int_], first: int, others: list[int]
 ) -> Iterator[tuple[int, int, int]]:
-    """Faces that form a parallelogram with `first`: (face, position in `first` of the corner opposite the shared edge,
-    index of the face's own opposite corner)."""
+    """The faces that form a parallelogram with the face `first`.
+
+    Yields the face, the position in `first` of the corner opposite the common edge, and the index of the vertex of the
+    other face that is opposite this edge.
+    """
     for second, turn in itertools.product(others, range(3)):
         a, b, c = (int(faces[first][(turn + k) % 3]) for k in range(3))
         rest = set(map(int, faces[second])) - {b, c}

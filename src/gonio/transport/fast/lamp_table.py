@@ -1,7 +1,8 @@
-"""Rectangles and balls of uniform radiance in tables: one formula per kind samples all of them.
+"""Rectangular and spherical lamps of uniform radiance in tables, sampled by one formula per kind.
 
-Called from the kernel, as other kinds of light are, lamps would take a tenth of the render time. Mitsuba also samples
-its balls by positions in 32 bits, which makes a ball of 4 mm at a distance of 3 m 2 % too bright.
+If they were called from the kernel, like other kinds of lights, these lamps would take a tenth of the render time. In
+addition, Mitsuba samples spheres through positions in single precision, which makes a sphere of 4 mm at a distance of
+3 m 2 % too bright.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ NONE, RECTANGLE, BALL = 0, 1, 2
 
 
 class LampTable:
-    """A row per emitter: rectangles and balls of uniform radiance; other emitters are not in the table.
+    """A table of the rectangular and spherical lamps of uniform radiance, with one row per lamp.
 
-    known  for each of `emitters`, whether it is in the table
+    known  for each emitter, whether it is in the table
     """
 
     def __init__(self, mi: ModuleType, emitters: Sequence[Emitter], pointers: OfVariant):
@@ -72,7 +73,7 @@ class LampTable:
         return row[3, 0] != NONE
 
     def _views(self, row: OfVariant, origin: Point) -> list[tuple[Mask, LampView]]:
-        """For each kind in the table: (lanes of that kind, the lamp as seen from a point)."""
+        """For each kind of lamp in the table, a mask of the lanes with this kind, and the lamp as seen from a point."""
         mi, result = self.mi, list[tuple[Mask, LampView]]()
         if RECTANGLE in self.kinds:
             result.append((row[3, 0] == RECTANGLE, RectangularArea(_rectangle(mi, row), origin)))
@@ -82,11 +83,11 @@ class LampTable:
         return result
 
     def sample(self, row: OfVariant, it: Interaction, u: Point) -> DirectionSample:
-        """A direction toward a lamp: uniform in solid angle for a ball, by area for a rectangle.
+        """Sample a direction toward a lamp: uniformly in solid angle for a ball, uniformly by area for a rectangle.
 
         u  two random numbers in [0, 1)
-        Sampling rectangles by solid angle would reduce the error with several near lamps by 6 % but take 25 % more
-        time: a path that hits a lamp would have to compute the solid angle again.
+        If rectangles were sampled by solid angle, the error with several near lamps would be 6 % smaller, but rendering
+        would take 25 % longer, because the solid angle must be computed again for a path that hits a lamp.
         """
         result: DirectionSample | None = None
         for here, view in self._views(row, it.p):
@@ -95,21 +96,21 @@ class LampTable:
         return result
 
     def pdf(self, row: OfVariant, origin: Point, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point that a ray hits at `distance`, where |cos| is `cosine`."""
+        """The density (1/sr) of `sample` toward a point that a ray hits at `distance`, where |cos| is `cosine`."""
         result = self.mi.Float(0)
         for here, view in self._views(row, origin):
             result = dr.select(here, view.pdf(distance, cosine), result)
         return result
 
     def sent(self, row: OfVariant, index: UInt, normal: Vector, direction: Vector, active: Mask) -> Radiance:
-        """Radiance of a lamp in `direction`, away from its surface; tabulated in RGB variants only."""
+        """The radiance of a lamp in a direction away from its surface. It is tabulated only in RGB variants."""
         mi = self.mi
         shines = (row[3, 1] != 0) | (dr.dot(normal, direction) > 0)
         return dr.select(shines & active, dr.gather(mi.Color3f, self.radiance, index, active), 0)
 
 
 class TabledLamps(Lamps):
-    """Lamps sampled from a table where it has them, otherwise by calls to Mitsuba's emitters."""
+    """Lamps that are sampled from a table, or by calls of Mitsuba's emitters if they are not in the table."""
 
     table: LampTable
     index_of_pointer: UInt | None
@@ -124,10 +125,10 @@ class TabledLamps(Lamps):
         pointers: OfVariant,
         index_of_pointer: UInt | None,
     ) -> TabledLamps | None:
-        """The lamps of a scene; None if no lamp fits into a table.
+        """The lamps of a scene; None if no lamp can be in a table.
 
         pointers          Dr.Jit's pointers to the emitters
-        index_of_pointer  index of each emitter, by the number of its pointer; None for a single emitter
+        index_of_pointer  index of each emitter, by the number of its pointer; None if there is only one emitter
         """
         table = LampTable(surfaces.mi, emitters, pointers)
         if not table.kinds:
@@ -177,18 +178,18 @@ class TabledLamps(Lamps):
 
 
 def has_known_sides(emitter: Emitter) -> bool:
-    """Whether a light is a surface that emits from one side, or equally from both."""
+    """Whether a light is a surface that emits from one side, or equally from both sides."""
     two_sided = getattr(emitter, "two_sided", False)
     return (two_sided or emitter.class_name() == "AreaLight") and emitter.get_shape() is not None
 
 
 def shines_evenly(mi: ModuleType, emitter: Emitter) -> bool:
-    """Whether a light is a surface with the same radiance everywhere on it."""
+    """Whether a light is a surface with uniform radiance."""
     return has_known_sides(emitter) and not mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
 
 
 def rectangle_of(mi: ModuleType, shape: Shape) -> Rectangle | None:
-    """The rectangle of a shape as kernel data, so that moving it recompiles nothing. None for other shapes."""
+    """The rectangle of a shape; None for other shapes. It is kernel data, so moving it does not recompile kernels."""
     row = np.zeros((4, 4))
     if shape.class_name() == "Rectangle":
         _fill(row, "Rectangle", np.array(placement_reader(mi)(shape)).reshape(4, 4), shape.has_flipped_normals())
@@ -204,7 +205,7 @@ def _rectangle(mi: ModuleType, row: OfVariant) -> Rectangle:
 
 
 def _fill(row: np.ndarray, kind: str, to_world: np.ndarray, flipped: bool) -> None:
-    """Fill a lamp's row: position and side of the normal, then axes and lengths of a rectangle or radius of a ball."""
+    """Fill the row of a lamp: position, side of the normal, and the axes and lengths of a rectangle or a ball's radius."""
     side = -1.0 if flipped else 1.0
     if kind == "Sphere":
         row[0], row[1, 3], row[3, 0] = (*to_world[:3, 3], side), np.linalg.norm(to_world[:3, 0]), BALL

@@ -1,8 +1,8 @@
-"""Chooses one of many lamps by position.
+"""Select one of many lamps depending on the position in the scene.
 
-The scene's bounding box is divided into cells. Each has a table of the lamps' probabilities: one part is proportional
-to the unoccluded light that each lamp sends to the cell, which accounts for distance and orientation; the other is
-uniform.
+The bounding box of the scene is divided into cells, each of which has a table of the probabilities of the lamps. One
+part of a probability is proportional to the unoccluded light that the lamp sends to the cell, which accounts for
+distance and orientation; the other part is uniform.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Emitter, Float, Mask, Point, Scene, UInt
 from ..lights.sky import Choice
 
-CELLS = 8  # per axis, at most
-MAX_ENTRIES = 1 << 21  # entries of a table
-POINTS = 4  # per cell, at which the light of the lamps is evaluated
-# Uniform part of the probabilities, or 1 / count if that is more: a lamp and a sky get at least a quarter each.
+CELLS = 8  # maximum number of cells per axis
+MAX_ENTRIES = 1 << 21  # maximum number of entries of a table
+POINTS = 4  # number of points per cell at which the light of the lamps is evaluated
+# The uniform part of the probabilities, or 1 / count if this is more. A lamp and a sky get at least a quarter each.
 EVEN = 0.25
 
 
 class LightGrid:
-    """Probabilities of the lights per cell."""
+    """The probabilities of the lights in each cell."""
 
     def __init__(self, mi: ModuleType, scene: Scene, emitters: Sequence[Emitter]) -> None:
         self.mi, count = mi, len(emitters)
@@ -43,8 +43,8 @@ class LightGrid:
         index = dr.arange(mi.UInt32, n * POINTS)
         cell = index // POINTS
         corner = mi.Point3f(cell % self.cells, (cell // self.cells) % self.cells, cell // self.cells**2)
-        # multiples mod 1 of 1/x, 1/x^2 and 1/x^3, where x^4 = x + 1 (R3 sequence, M. Roberts): evenly spread and
-        # deterministic
+        # multiples of 1/x, 1/x^2 and 1/x^3, modulo 1, where x^4 = x + 1, are evenly distributed and deterministic (R3
+        # sequence, M. Roberts)
         inside = mi.Point3f(*(_fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
         it = dr.zeros(mi.SurfaceInteraction3f, n * POINTS)
         it.p = self._low + (corner + inside) / self._scale
@@ -68,18 +68,18 @@ class LightGrid:
     def _row(self, p: Point) -> UInt:
         mi = self.mi
         at = [dr.clip((p[i] - self._low[i]) * self._scale[i], 0.0, self.cells - 1.0) for i in range(3)]
-        # NaN, which `clip` preserves, becomes 2^32 - 1 on processors without AVX-512
+        # `clip` preserves NaN, which is converted to 2^32 - 1 on processors without AVX-512
         x, y, z = (dr.minimum(mi.UInt32(v), self.cells - 1) for v in at)
         return x + self.cells * (y + self.cells * z)
 
     def choose(self, p: Point, u: Float) -> tuple[UInt, Float, Float]:
-        """(index of a lamp, `u` rescaled to [0, 1] for reuse, the lamp's probability)."""
+        """Select a lamp. Returns its index, `u` rescaled to [0, 1] for reuse, and the probability of the lamp."""
         row = self._row(p)
         index, left = self._choice.of(row, u)
         return index, left, dr.gather(self.mi.Float, self._chance, row * self.columns + index)
 
     def probability(self, p: Point, index: UInt, active: Mask) -> Float:
-        """The probability that `choose` returns this lamp."""
+        """The probability with which `choose` selects this lamp."""
         return dr.gather(self.mi.Float, self._chance, self._row(p) * self.columns + index, active)
 
 

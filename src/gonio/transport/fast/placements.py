@@ -1,9 +1,9 @@
-"""Surfaces of many spheres or rectangles, without a call per shape.
+"""Compute the surface interactions of many spheres or rectangles without a call per shape.
 
-Mitsuba computes the surface at a hit by a virtual call to the shape, which Dr.Jit traces once per shape: 0.1 ms each,
-at every vertex of the program. For many spheres or rectangles, the placements are therefore stored in one array: each
-lane reads that of the shape that it has hit, and the formula appears in the kernel once. Other shapes are called as
-before. Meshes need no table, since those of equal material are merged.
+Mitsuba computes the surface interaction at a hit by a virtual call of the shape. Dr.Jit traces this call for every
+shape, which takes 0.1 ms per shape and vertex. For many spheres or rectangles, the placements are therefore stored in
+one array: each lane reads the placement of the shape that it has hit, and the formula appears only once in the kernel.
+Other shapes are called as usual. Meshes do not need a table, because meshes of equal material are merged.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Hit, Mask, OfVariant, Ray, Scene, Shape, SurfaceInteraction, UInt, Vector
 from ..placement import placement_reader
 
-# Smallest number of shapes of a kind. Two spheres cost no more than one, since their code is the same; tracing 64 of
-# them takes about as long as the program around them.
+# The minimum number of shapes of a kind. Tracing the calls of 64 spheres takes about as long as the rest of the
+# program.
 MANY = 64
 
 
 class Placements:
-    """The shapes of a scene whose placements are in a table; the others are called."""
+    """The shapes of a scene whose placements are in a table. Other shapes are called."""
 
     def __init__(self, mi: ModuleType, scene: Scene, kinds: dict[str, list[Shape]]) -> None:
         self.mi, self.kinds = mi, list(kinds)
         shapes, read = scene.shapes(), placement_reader(mi)
         self.others = [shape for shape in shapes if shape.class_name() not in self.kinds]
         numbers = dict(zip(map(id, shapes), np.array(dr.reinterpret_array(mi.UInt32, scene.shapes_dr())), strict=True))
-        size = 1 + max(numbers.values())  # in a kernel, a pointer to a shape is a number from 1 on
+        size = 1 + max(numbers.values())  # in a kernel, a pointer to a shape is a number greater than 0
         kind_of, place = np.zeros(size, np.uint32), np.zeros(size, np.uint32)
         placement = np.zeros((size, 16))
         for index, kind in enumerate(self.kinds, start=1):
@@ -47,14 +47,14 @@ class Placements:
 
     @staticmethod
     def of(mi: ModuleType, scene: Scene, least: int) -> Placements | None:
-        """The placements of a scene; None if it has fewer than `least` shapes of each supported kind."""
+        """The placements of a scene; None if there are fewer than `least` shapes of each supported kind."""
         shapes = scene.shapes()
         kinds = {kind: [shape for shape in shapes if shape.class_name() == kind] for kind in _KINDS}
         kinds = {kind: members for kind, members in kinds.items() if len(members) >= least}
         return Placements(mi, scene, kinds) if kinds else None
 
     def interaction(self, hit: Hit, ray: Ray, active: Mask) -> SurfaceInteraction:
-        """The surface that was hit, with everything that Mitsuba's `compute_surface_interaction` returns."""
+        """The surface interaction at a hit, with all fields that Mitsuba's `compute_surface_interaction` sets."""
         mi = self.mi
         active = active & hit.is_valid()
         number = dr.reinterpret_array(mi.UInt32, hit.shape)
@@ -66,7 +66,7 @@ class Placements:
         return si
 
     def _called(self, hit: Hit, ray: Ray, number: UInt, active: Mask) -> SurfaceInteraction:
-        """Surfaces of the other shapes, by calls."""
+        """The surface interactions of other shapes, computed by calls."""
         mi = self.mi
 
         def ask(shape: Shape) -> Callable[[Hit, Ray, Mask], SurfaceInteraction]:
@@ -82,7 +82,7 @@ class Placements:
         return self._finished(result, hit, ray)
 
     def _placed(self, formula: Formula, hit: Hit, ray: Ray, placement: OfVariant) -> SurfaceInteraction:
-        """The surface of a shape with the given placement, computed by `formula`."""
+        """The surface interaction of a shape with the given placement, computed by `formula`."""
         mi = self.mi
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.t = hit.t
@@ -91,7 +91,7 @@ class Placements:
         return self._finished(si, hit, ray)
 
     def _finished(self, si: SurfaceInteraction, hit: Hit, ray: Ray) -> SurfaceInteraction:
-        """Complete the result as Mitsuba does for any shape: frame, incoming direction, and the shape that was hit."""
+        """Set the fields that Mitsuba sets for all shapes: the frame, the incoming direction, and the shape."""
         valid = hit.is_valid()
         si.t = dr.select(valid, hit.t, dr.inf)
         si.time, si.wavelengths = ray.time, ray.wavelengths
@@ -106,18 +106,22 @@ Formula = Callable[[ModuleType, SurfaceInteraction, Hit, Ray, list[Vector], OfVa
 
 
 def _of_spheres(to_world: Matrices, sign: NDArray[np.float64]) -> Matrices:
-    """Packed spheres. Columns 0 to 2: axes, as long as the radius; 3: center, and 1, or -1 if the normal is inward."""
+    """Pack the placements of spheres.
+
+    Columns 0 to 2 are the axes, whose length is the radius. Column 3 is the center, and 1, or -1 if the normal points
+    inward.
+    """
     placement = to_world.copy()
     placement[:, 3, 3] = sign
     return placement
 
 
 def _sphere(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, column: list[Vector], sign: OfVariant) -> None:
-    """A sphere's surface: u is the azimuth about its z axis from x, v the angle from z, both scaled to [0, 1]."""
+    """The surface of a sphere. u is the azimuth about z, and v the angle to z, both scaled to [0, 1]."""
     x, y, z, center = column
     radius = dr.norm(x)
     normal = dr.normalize(ray(hit.t) - center)
-    si.p = dr.fma(normal, radius, center)  # project onto the sphere, since the distance along the ray is rounded
+    si.p = dr.fma(normal, radius, center)  # project onto the sphere, because the distance along the ray is rounded
     local = mi.Vector3f(dr.dot(normal, x), dr.dot(normal, y), dr.dot(normal, z)) / radius
     azimuth = dr.atan2(local.y, local.x)
     azimuth = dr.select(azimuth < 0, azimuth + 2 * dr.pi, azimuth)
@@ -131,13 +135,13 @@ def _sphere(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, column: 
 
 
 def _angle_from_z(v: Vector) -> OfVariant:
-    """The angle of a unit vector with z, accurate at both poles."""
+    """The angle between a unit vector and z, accurate at both poles."""
     near = 2 * dr.asin(0.5 * dr.norm(v - dr.select(v.z >= 0, 1, -1) * type(v)(0, 0, 1)))
     return dr.select(v.z >= 0, near, dr.pi - near)
 
 
 def _of_rectangles(to_world: Matrices, sign: NDArray[np.float64]) -> Matrices:
-    """Packed rectangles. Columns 0 and 1: dp_du and dp_dv; 2: unit normal; 3: center."""
+    """Pack the placements of rectangles: columns 0 and 1 are dp_du and dp_dv, 2 the unit normal, and 3 the center."""
     placement = to_world.copy()
     placement[:, :3, :2] *= 2  # from [-1, 1] to [0, 1]
     normal = np.cross(to_world[:, :3, 0], to_world[:, :3, 1])
@@ -147,7 +151,7 @@ def _of_rectangles(to_world: Matrices, sign: NDArray[np.float64]) -> Matrices:
 
 
 def _rectangle(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, column: list[Vector], _: OfVariant) -> None:
-    """A rectangle's surface, or a parallelogram's: u and v run along its edges, in [0, 1]."""
+    """The surface of a rectangle or a parallelogram. u and v, in [0, 1], are the coordinates along the edges."""
     si.dp_du, si.dp_dv, normal, middle = column
     point = ray(hit.t)
     si.p = dr.fma(normal, dr.dot(middle - point, normal), point)  # project onto the plane

@@ -1,8 +1,8 @@
-"""A scene lit by a single rectangle, like most of the lab's scenes.
+"""Scenes with a single rectangular lamp, like most scenes of the lab.
 
-No light is chosen, and the kernel calls no emitter: the rectangle is sampled uniformly in its solid angle, for both
-`gonio_area` and Mitsuba's one-sided `area`. For the last ray of a path, a hit test of one rectangle and a shadow ray
-replace the search for the nearest surface.
+No light needs to be selected, and the kernel does not call an emitter: the rectangle is sampled uniformly in solid
+angle, both for `gonio_area` and for Mitsuba's one-sided `area`. For the last ray of a path, an intersection test with
+one rectangle and a shadow ray replace the search for the nearest surface.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .lamp_table import has_known_sides, rectangle_of
 
 
 class RectangleLight(Lamps):
-    """The only light of a scene, a rectangle."""
+    """A rectangle that is the only light of a scene."""
 
     rectangle: Rectangle
 
@@ -29,7 +29,7 @@ class RectangleLight(Lamps):
     def of(
         cls, surfaces: Surfaces, emitters: Sequence[Emitter], scene_indices: UInt, environment: int
     ) -> RectangleLight | None:
-        """The light of a scene with a single one; None if it is not a rectangle."""
+        """The light of a scene; None if there are several lights or the light is not a rectangle."""
         rectangle = rectangle_of(surfaces.mi, emitters[0].get_shape()) if has_known_sides(emitters[0]) else None
         if rectangle is None:
             return None
@@ -51,7 +51,7 @@ class RectangleLight(Lamps):
         return self.rectangle.pdf(hit.solid_angle, distance, dr.abs(dr.dot(away, hit.si.n)) / distance)
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> tuple[Radiance, Float]:
-        """The radiance that arrives along a ray, and the density of `sample` in its direction."""
+        """The radiance that arrives along a ray, and the density of `sample` for the direction of the ray."""
         mi = self.mi
         distance, uv, hit = self.rectangle.hit(ray.o, ray.d)
         active = active & hit & (distance < ray.maxt)

@@ -1,12 +1,13 @@
-"""Integrators, which determine the quantity that a picture shows. Renders run in passes; their sizes do not matter.
+"""Integrators, which determine the quantity that a picture shows.
 
     >>> render = Render(mi.load_dict(scene), Settings("path", max_depth=5))
     >>> while render.done < 256:
-    ...     render.advance(16)          # stop at any time: render.image() is the picture so far
+    ...     render.advance(16)          # the picture so far is render.image()
     >>> picture = render.image()        # (height, width, 3) float32, row 0 on top
 
-An integrator is one file in this folder, an entry point of the group "gonio.integrators", or a class that a program
-registers: see `Integrator`. Read `direct.py` first, then `path.py`; their steps are in `light_transport.py`.
+A render runs in passes, whose sizes do not affect the picture. An integrator is defined by a file in this folder, by an
+entry point of the group "gonio.integrators", or by a class that a program registers, see `Integrator`. Read `direct.py`
+first, then `path.py`; the steps that they combine are in `light_transport.py`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def __getattr__(name: str) -> object:
 
 
 class _Transport(Path):
-    """The former name of the base class of integrators that follow light: paths to `depth`, without roulette."""
+    """The former base class of integrators for light transport: path tracing to `depth`, without Russian roulette."""
 
     name = ""
     takes_depth = False

@@ -1,4 +1,4 @@
-"""The base class of integrators: the program that the kernel runs for every sample of a pixel."""
+"""The base class of integrators, which define the computation for every sample of a pixel."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ SAMPLERS: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Settings:
-    """Options of a render.
+    """The settings of a render.
 
-    integrator  the name of an `Integrator`
-    max_depth   for integrators that take a depth: maximum path length in segments; N allows N - 1 shaded vertices
-    sampler     a name of `SAMPLERS`
-    seed        an integer of 32 bits; the same seed gives a bit-identical picture
-    ambient     scene-wide ambient radiance (r, g, b): every shaded vertex adds `ambient` times the BSDF's own
-                attribute "ambient", if it has one (Phong's ka)
-    radius      factor applied to the default initial radius of an integrator that blurs
-    measures    whether such an integrator also measures its blur
+    integrator  name of an `Integrator`
+    max_depth   maximum path length in segments, for integrators with a depth; N allows N - 1 shaded vertices
+    sampler     a name in `SAMPLERS`
+    seed        a 32-bit integer; equal seeds give bit-identical pictures
+    ambient     ambient radiance of the scene, (r, g, b). Every shaded vertex adds `ambient` times the attribute
+                "ambient" of the BSDF, if it has one (Phong's ka)
+    radius      factor by which the default initial radius is multiplied, for an integrator that blurs
+    measures    whether an integrator that blurs also measures its blur
     """
 
     integrator: str = "path"
@@ -61,18 +61,18 @@ class Settings:
 
     @property
     def program(self) -> type[Integrator]:
-        """The integrator's class. Raises InputError for an unknown name."""
+        """The class of the integrator. Raises InputError for an unknown name."""
         return Integrator.family.get(self.integrator)
 
 
 def check_sampler(name: str, location: str = "sampler") -> None:
-    """Raise InputError if no sampler has that name; `location` is the place that the error names."""
+    """Raise InputError, which names `location`, if there is no sampler with the given name."""
     if name not in SAMPLERS:
         raise InputError(f"unknown sampler '{name}'", location, did_you_mean(name, list(SAMPLERS)))
 
 
 class Integrator:
-    """Computes what a picture shows. The first line of its docstring is its title.
+    """Computes the quantity that a picture shows. The first line of the docstring of a subclass is its title.
 
         class Depth(Integrator):
             '''The distance to the visible surface, in units of the scene.'''
@@ -82,20 +82,21 @@ class Integrator:
             def show(self, si, key, index):
                 return self.mi.Color3f(si.t)
 
-    A subclass implements `show`, which gets one surface, or `sample`, which may trace rays; a subclass that follows
-    light derives from `LightTransport` or from `Path`. Its parameters and the scene's must reach the kernel as data
-    (`dr.opaque`), not as Python numbers; otherwise each changed value recompiles the kernel.
+    A subclass implements `show`, which receives a surface, or `sample`, which may trace rays. A subclass that computes
+    light transport derives from `LightTransport` or from `Path`. Its parameters and those of the scene must be kernel
+    data (`dr.opaque`) instead of Python numbers; otherwise every change of a value recompiles the kernel.
 
-    name           value of `--integrator` and of a scene's "integrator"
-    takes_depth    whether `Settings.max_depth` applies; if so, a scene must give maxDepth
+    name           value of `--integrator` and of "integrator" in a scene
+    takes_depth    whether `Settings.max_depth` applies; if so, a scene must define maxDepth
     samples_lobes  whether BSDFs are sampled in addition to the lights
-    splats         whether a sample adds to pixels other than its own, as integers of size `unit` (`Sums.splats`)
-    blurs          whether it has a bias that vanishes as the number of samples grows; this number must then be equal
-                   for all pixels
-    shrinking      exponent of the number of samples in the radius of the blur, negative
-    measured       how many numbers it computes per sample besides the color, see `differences`
+    splats         whether samples contribute to other pixels than their own, as integers in units of `unit`
+                   (`Sums.splats`)
+    blurs          whether the picture has a bias that vanishes as the number of samples grows; this number must then be
+                   the same for all pixels
+    shrinking      exponent of the number of samples in the radius of the blur, a negative number
+    measured       number of values that are computed per sample in addition to the color, see `differences`
 
-    data, settings, mi  the scene's data (`SceneData`), the options, and Mitsuba with its variant
+    data, settings, mi  the data of the scene (`SceneData`), the settings, and Mitsuba with its variant
     """
 
     family: ClassVar[Family[type[Integrator]]]
@@ -103,7 +104,7 @@ class Integrator:
     takes_depth: ClassVar[bool] = False
     splats: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
-    unit: float = 1.0  # radiance of one unit of the splats
+    unit: float = 1.0  # radiance of a splat with the value 1
     shrinking: ClassVar[float] = 0.0
     samples_lobes: ClassVar[bool] = True
     measured: int = 0
@@ -114,16 +115,19 @@ class Integrator:
     # ------------------------------------------------------------------ a subclass implements one of these two
 
     def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Color:
-        """The color (r, g, b) of the surface that a sample hits; the result is ignored on lanes without a hit.
+        """The color (r, g, b) of the surface that a sample hits. The result is ignored on lanes without a hit.
 
-        key, index  key of the pixel and index of its sample: `self.pair(key, index, FIRST_FREE)` gives two numbers in
-                    [0, 1), and `self.direction_pair(...)` two for a direction
+        key, index  key of the pixel and index of the sample: `self.pair(key, index, FIRST_FREE)` returns two random
+                    numbers in [0, 1), and `self.direction_pair(...)` two random numbers for a direction
         """
         raise NotImplementedError(f"{type(self).__name__} has neither show nor sample")
 
     def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
-        """[r, g, b] of a sample; with `aovs`, followed by albedo and normal of its first surface, three numbers
-        each."""
+        """The color of a sample, [r, g, b], followed by the albedo and the normal of the first surface if `aovs` is
+        set.
+
+        The albedo and the normal consist of three numbers each.
+        """
         ray, _, hit = self.first_hit(pixel, key, index)
         si = self.surfaces.interaction(hit, ray)
         features = (0, 0, 0, *si.sh_frame.n) if self.data.aovs else ()
@@ -132,15 +136,15 @@ class Integrator:
     # ------------------------------------------------------------------ provided by this class
 
     def differences(self, measured: Picture, samples: int) -> list[Picture]:
-        """The result of `Render.differences`, from the mean of the measured numbers over `samples` samples."""
+        """The result of `Render.differences`, computed from the mean of the measured values over `samples` samples."""
         return []
 
     def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """Samples [first, last) divided into kernel launches; the data of each is prepared before it is yielded."""
+        """Divide samples [first, last) into kernel launches, and prepare the data of each before it is yielded."""
         yield first, last
 
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
-        """Add samples [first, last) of every pixel to the sums, each sum in the order of the samples."""
+        """Add samples [first, last) of every pixel to the sums, in the order of the samples."""
 
         def step(index: UInt, sums: Sums) -> tuple[UInt, Sums]:
             values, every = self.sample(pixel, key, index), self.mi.Bool(True)
@@ -150,34 +154,37 @@ class Integrator:
         return dr.while_loop(state, lambda i, _: i < last, step, mode="symbolic", label="samples")[1]
 
     def first_hit(self, pixel: UInt, key: UInt, index: UInt) -> tuple[Ray, Radiance, Hit]:
-        """A sample's camera ray, its weight, and its first hit."""
+        """The camera ray of a sample, its weight, and its first hit."""
         return self.data.first_hit(pixel, key, index)
 
     def pair(self, key: UInt, index: UInt, dimension: UInt) -> tuple[Float, Float]:
-        """Two numbers in [0, 1) for one decision of a sample; `dimension` identifies the decision, from FIRST_FREE."""
+        """Two random numbers in [0, 1) for a decision of a sample.
+
+        dimension  number of the decision, at least FIRST_FREE
+        """
         return self.data.pair(key, index, dimension)
 
     def direction_pair(self, key: UInt, index: UInt, dimension: UInt) -> tuple[Float, Float]:
-        """Two numbers in [0, 1) for a decision about a direction."""
+        """Two random numbers in [0, 1) for the choice of a direction."""
         return self.data.direction_pair(key, index, dimension)
 
     @property
     def scene(self) -> Scene:
-        """Mitsuba's scene."""
+        """The Mitsuba scene."""
         return self.data.scene
 
     @property
     def sensor(self) -> Sensor:
-        """Mitsuba's camera."""
+        """The Mitsuba camera."""
         return self.data.sensor
 
     @property
     def surfaces(self) -> Surfaces:
-        """The surfaces that rays hit: `nearest`, `blocked`, `interaction`."""
+        """The surfaces of the scene, with the methods `nearest`, `blocked` and `interaction`."""
         return self.data.surfaces
 
     def advice(self) -> str:
-        """Advice to a user who chose this integrator for this scene; "" if there is none."""
+        """Advice to the user about the choice of this integrator for this scene; "" if there is none."""
         return ""
 
 

@@ -1,4 +1,4 @@
-"""Path tracing with a progressive photon map of the light behind mirrors and smooth glass."""
+"""Path tracing with a progressive photon map for the light that mirrors and smooth glass cast."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from .base import Picture, Settings
 from .light_transport import FIRST_VERTEX, ROULETTE, PathState, VertexNumbers
 from .path import Path
 
-INNER = 0.25  # fraction of the radius used for the comparison that measures blur
+INNER = 0.25  # radius of the search to which blur is compared, as a fraction of the radius
 
 
 @dataclass
 class CausticPath:
-    """A path with the state of its current chain of mirrors and smooth glass.
+    """A path, and the state of its current chain of mirrors and smooth glass.
 
-    lobe    pdf / cosine with which the last lobe before the chain was sampled; 0 if there was none
-    counts  fraction of the light behind the chain that the path contributes; particles contribute the rest
-    blur    excess of the particles' light over that of the close ones; None if it is not measured
+    lobe    pdf / cosine with which the last lobe before the chain was sampled; 0 if there is no such lobe
+    counts  fraction of the light beyond the chain that the path contributes; particles contribute the rest
+    blur    excess of the light from particles over the light from close particles; None if it is not measured
     """
 
     path: PathState
@@ -44,15 +44,15 @@ class CausticPath:
 class Caustics(Path):
     """Path tracing, with a photon map for the light that mirrors and smooth glass cast on other surfaces.
 
-    Light that mirrors or glass cast on a surface is sampled by paths from the camera if the lamps are large, and by
-    particles from the lamps if they are small; both are weighted by their probability of sampling it. A particle
-    contributes within a radius that shrinks, so the picture is blurred by about a pixel at first and converges to a
-    sharp one (consistent, not unbiased); all other light is computed as by `path`.
+    Light that mirrors or glass cast on a surface is sampled mainly by paths from the camera if the lamps are large, and
+    mainly by particles from the lamps if they are small; the two are combined by MIS. A particle contributes within a
+    radius that decreases. The picture is therefore blurred by about a pixel at first and converges to a sharp picture:
+    the method is consistent but not unbiased. All other light is computed as by `path`.
 
-    The weights: a path that leaves a surface with density p toward mirrors and hits the lamp behind them has density
-    p / cos with respect to étendue. N particles that take the same chain from the lamp have g N pi r^2, where g is
-    their density at the lamp; mirrors and lenses change the width of the beam equally for both. Georgiev2012 introduced
-    vertex merging as another technique to sample a path.
+    The weights are determined by densities with respect to étendue. A path that leaves a surface toward mirrors with
+    the density p and then hits a lamp has the density p / cos. N particles that follow the same chain of mirrors from
+    the lamp have the density g N pi r^2, where g is their density at the lamp; mirrors and lenses change the width of
+    the beam equally for both. Vertex merging as a sampling technique for paths was introduced by Georgiev2012.
 
     Lamps that the camera sees directly through mirrors and glass are sampled by a retrace, see `delta_retrace`.
     """
@@ -63,7 +63,7 @@ class Caustics(Path):
 
     def __init__(self, data: SceneData, settings: Settings) -> None:
         super().__init__(data, settings)
-        self.last_ray_apart = self.one_bounce = False  # the light of the last ray is weighted against the particles
+        self.last_ray_apart = self.one_bounce = False  # the light along the last ray is weighted by MIS with particles
         self.merging = bool(self.smooth) and self.lights.count > 0 and settings.max_depth > 2
         self.retraces = False
         if self.merging:
@@ -75,7 +75,7 @@ class Caustics(Path):
         return ""
 
     def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """Groups of samples that share a map; the map is built before they are yielded."""
+        """Divide samples into groups that share a map, and build the map of each group before it is yielded."""
         if not self.merging:
             yield from super().stages(first, last)
             return
@@ -83,7 +83,7 @@ class Caustics(Path):
             number = first // SAMPLES_PER_MAP
             self.maps.prepare(number)
             for read in (self.maps.density, self.maps.current):
-                copy_arrays(read)  # copied after the sums in every stage, so that the kernels are identical
+                copy_arrays(read)  # copied after the sums at every stage, so that the kernels are identical
             end = min(last, (number + 1) * SAMPLES_PER_MAP)
             yield first, end
             first = end
@@ -91,7 +91,7 @@ class Caustics(Path):
     # ------------------------------------------------------------------ the loop
 
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
-        """Add samples [first, last) of every pixel to the sums, as `path` does; a retrace follows some of them."""
+        """Add samples [first, last) of every pixel to the sums, as `path` does; some are followed by a retrace."""
         if not self.merging:
             return super().accumulate(pixel, key, first, last, sums)
         mi = self.mi
@@ -117,7 +117,7 @@ class Caustics(Path):
         return CausticPath(path, mi.Float(0), mi.Float(1), Retrace.none(mi), blur)
 
     def regenerate(self, fresh: CausticPath, state: CausticPath, key: UInt, begins: Mask) -> tuple[CausticPath, Mask]:
-        """On lanes whose path has ended, start its retrace or the next sample; also returns the lanes of the latter."""
+        """On lanes whose path has ended, start the retrace or the next sample; also returns lanes with new samples."""
         if not self.retraces:
             return dr.select(begins, fresh, state), begins
         retraced = begins & (state.retrace.phase == delta_retrace.DUE)
@@ -129,7 +129,7 @@ class Caustics(Path):
         return dr.select(begins, fresh, state), begins & ~retraced
 
     def merged_bounce(self, state: CausticPath, key: UInt) -> tuple[CausticPath, list[Float]]:
-        """A vertex of `path`, with the light of particles added."""
+        """Process a vertex as `path` does, and add the light from particles."""
         path = state.path
         vertex, throughput = self.intersect(path)
         emitted = self.emitted(path, vertex)
@@ -140,7 +140,7 @@ class Caustics(Path):
             active &= ~(state.retrace.retracing & self.mi.has_flag(vertex.bsdf.flags(), self.mi.BSDFFlags.Smooth))
         throughput, hero_only = self.keep_hero(path, vertex, throughput, active)
 
-        # Light sampling; the same call of the BSDF samples the next direction.
+        # Light sampling; the same call of the BSDF also samples the next direction.
         u = self.numbers(path, key)
         if self.retraces:
             u.lobe = state.retrace.lobe(u.lobe)
@@ -148,7 +148,7 @@ class Caustics(Path):
         light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
         gathered = self.direct_light(vertex, light, light_value, light_pdf, active)
 
-        # Light of particles, weighted against paths that continue through mirrors
+        # The light from particles, weighted by MIS with paths that continue through mirrors
         photons, excess, counts = self.gather_photons(state, vertex, u, active)
         gathered = gathered + dr.select(active, photons, 0)
         radiance = radiance + throughput * gathered
@@ -165,7 +165,7 @@ class Caustics(Path):
         return self.after_bounce(state, path, vertex, bs, counts, blur), features
 
     def values(self, state: CausticPath) -> list[Float]:
-        """[r, g, b] of a complete sample, and its blur as measured with the even maps and with the odd maps."""
+        """The color of a complete sample, [r, g, b], and its blur as measured with the even and with the odd maps."""
         path = state.path
         values = [*self.data.rgb(path.radiance, path.ray.wavelengths)]
         if not self.measured:
@@ -177,7 +177,7 @@ class Caustics(Path):
     # ------------------------------------------------------------------ the steps at a vertex
 
     def emission_weight(self, state: CausticPath, vertex: Vertex, emitted: Radiance) -> Float:
-        """MIS weight of the lamp that a path hits through mirrors, against the particles or a retrace."""
+        """The MIS weight of a lamp that a path hits through mirrors, relative to the particles or to a retrace."""
         path, sources = state.path, self.maps.particles.sources
         lit = path.active & (path.pdf == 0) & dr.any(emitted != 0)
         behind = lit & (state.lobe > 0)
@@ -190,14 +190,16 @@ class Caustics(Path):
     def gather_photons(
         self, state: CausticPath, vertex: Vertex, u: VertexNumbers, active: Mask
     ) -> tuple[Radiance, Radiance, Float]:
-        """(light of the particles at a vertex, its excess over that of the close ones, the fraction of the light behind
-        mirrors that the path contributes from there on)."""
+        """The light from particles at a vertex, its excess over the light from close particles, and a fraction.
+
+        This is the fraction of the light beyond mirrors that the path contributes from this vertex on.
+        """
         mi, maps, si, path = self.mi, self.maps, vertex.si, state.path
         photons = maps.current
         if vertex.crossing is not None:
             active = active & vertex.crossing.surface
         active = active & mi.has_flag(vertex.bsdf.flags(), mi.BSDFFlags.Smooth)
-        # A path that arrived here through mirrors is weighted against particles stored at their second surface.
+        # A path that arrived through mirrors is weighted by MIS with particles that are stored at their second surface.
         by_mirrors = (state.lobe > 0) & (path.pdf == 0)
         counts = dr.select(by_mirrors, maps.path_weight(state.lobe, maps.etendue_density(si.p)), 1)
 
@@ -217,7 +219,7 @@ class Caustics(Path):
         return light, excess, counts
 
     def roulette_behind(self, state: CausticPath, path: PathState, u: VertexNumbers) -> PathState:
-        """Russian roulette, except in a retrace and in a first trace before its retrace is due."""
+        """Russian roulette, except in a retrace, and in a first path whose retrace is not yet due."""
         played = self.roulette(path, u)
         if not self.retraces:
             return played
@@ -234,7 +236,7 @@ class Caustics(Path):
         counts: Float,
         blur: Radiance | None,
     ) -> CausticPath:
-        """The path's state after the vertex; `state` is before it, `path` after it."""
+        """The state after a vertex, from the `state` before it and the `path` after it."""
         mi = self.mi
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         begun = bs.pdf / dr.maximum(abs(dr.dot(path.ray.d, vertex.si.n)), 1e-6)
@@ -250,7 +252,7 @@ class Caustics(Path):
     # ------------------------------------------------------------------ blur
 
     def differences(self, measured: Picture, samples: int) -> list[Picture]:
-        """Differences from a picture with INNER times the radius: one from the even maps, one from the odd maps."""
+        """The differences from a picture with INNER times the radius, from the even maps and from the odd maps."""
         if not self.measured:
             return []
         rounds, rest = divmod(samples, 2 * SAMPLES_PER_MAP)

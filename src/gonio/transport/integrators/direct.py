@@ -1,4 +1,4 @@
-"""Direct light by light and BSDF sampling."""
+"""Direct illumination by light and BSDF sampling."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .light_transport import LightTransport, PathState
 
 
 class Direct(LightTransport):
-    """Direct light: light and BSDF sampling combined (multiple importance sampling)."""
+    """Direct illumination by light and BSDF sampling (multiple importance sampling)."""
 
     name = "direct"
 
@@ -29,13 +29,13 @@ class Direct(LightTransport):
         return dr.while_loop(state, lambda index, _: index < last, step, mode="symbolic", label="samples")[1]
 
     def bounce(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
-        """Emission of the surface that the camera ray has hit, and the direct light that this surface reflects."""
+        """Add the emission of the surface that the camera ray has hit, and the direct light that it reflects."""
         vertex, throughput = self.intersect(path)
         radiance = path.radiance + throughput * self.emitted(path, vertex)
         active = path.active & vertex.si.is_valid()
         throughput, hero_only = self.keep_hero(path, vertex, throughput, active)
 
-        # Light sampling; the same call of the BSDF samples a direction.
+        # Light sampling; the same call of the BSDF also samples a direction.
         u = self.numbers(path, key)
         light = self.sample_light(vertex, u, active) if self.samples_lights else None
         light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
@@ -43,7 +43,7 @@ class Direct(LightTransport):
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(vertex, active)
 
-        # BSDF sampling: the light that the sampled direction hits.
+        # BSDF sampling: the light in the sampled direction.
         throughput = throughput * weight
         features = self.data.features(throughput, vertex.si, path.active, active)
         path = replace(path, throughput=throughput, radiance=radiance, hero_only=hero_only)

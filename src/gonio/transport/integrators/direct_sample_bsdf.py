@@ -1,4 +1,4 @@
-"""Direct light by sampling the BSDF."""
+"""Direct illumination by BSDF sampling."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from .direct import Direct
 
 
 class DirectSampleBSDF(Direct):
-    """Direct light, by sampling the BSDF only."""
+    """Direct illumination by BSDF sampling only."""
 
     name = "directSampleBSDF"
     samples_lights = False

@@ -1,4 +1,4 @@
-"""Direct light by sampling lights."""
+"""Direct illumination by light sampling."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from .direct import Direct
 
 
 class DirectSampleLight(Direct):
-    """Direct light, by sampling the lights only, except at mirrors and smooth glass."""
+    """Direct illumination by light sampling only, except at mirrors and smooth glass."""
 
     name = "directSampleLight"
     samples_lobes = False

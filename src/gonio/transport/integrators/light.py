@@ -18,9 +18,9 @@ from .light_transport import LightTransport
 class Light(LightTransport):
     """Particle tracing from the lamps, with every vertex connected to the camera: a reference for `path`.
 
-    Light that leaves mirrors and smooth glass toward the camera is missing, since no connection to the camera is
-    possible there. One sample per pixel amounts to as many particles as the picture has pixels. Splats are added up as
-    integers, whose sum does not depend on the order.
+    Light that leaves mirrors and smooth glass toward the camera is missing, because their vertices cannot be connected
+    to the camera. One sample per pixel means as many particles as the picture has pixels. Splats are accumulated as
+    integers, so the sum does not depend on their order.
     """
 
     name = "light"
@@ -39,12 +39,12 @@ class Light(LightTransport):
         return settings.max_depth
 
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
-        """Add the splats of samples [first, last) of every lane's particles."""
+        """Trace samples [first, last), which are particles, on every lane, and add their splats."""
         if not self.lights.count:
             return sums
 
         def sample(index: UInt, invalid: UInt) -> tuple[UInt, UInt]:
-            """One particle per lane, from its lamp to its end."""
+            """Trace one particle per lane, from its lamp to the end of its path."""
             key, low = self.particles.number(index, pixel, self.camera.pixels)
             particle, flight = self.particles.leave(key, low)
             invalid += self.camera.see_lamp(key, low, particle, sums)
@@ -62,17 +62,17 @@ class Light(LightTransport):
         return Sums(sums.radiance, sums.features, invalid, sums.splats)
 
     def step(self, flight: Flight, invalid: UInt, key: UInt, low: UInt, sums: Sums) -> tuple[Flight, UInt]:
-        """One vertex of a particle: connect it to the camera, then continue to the next surface."""
+        """Process one vertex of a particle: connect it to the camera, then continue to the next surface."""
         particles, camera, active = self.particles, self.camera, flight.active
         vertex = particles.intersect(flight)
         bs, weight = particles.sample_bsdf(key, low, flight, vertex)
 
-        # Connect the vertex to the camera.
+        # The connection to the camera
         ds, importance = camera.sample_direction(key, low, flight.dimension, vertex.si, active)
         value = particles.eval_bsdf(vertex, vertex.si.to_local(ds.d), active) * importance
         value = particles.through_media(vertex, value, ds)
         value *= flight.flux * flight.throughput
         result = camera.splat(key, low, sums, Splat(ds.uv, value, vertex.si, ds.p), active)
 
-        # Follow the sampled direction.
+        # The next surface in the sampled direction
         return particles.follow(key, low, flight, vertex, bs, weight, active), invalid + result

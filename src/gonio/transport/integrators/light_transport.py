@@ -1,17 +1,17 @@
-"""The steps of a path, which integrators combine in loops of their own.
+"""The steps of a path, which integrators combine in their own loops.
 
     camera_path   the camera ray and its first hit; then, at each vertex:
     intersect     the surface at the hit
-    emitted       its emission, weighted against light sampling (MIS)
+    emitted       the emission of the surface, weighted by MIS with light sampling
     sample_light  a point on a lamp
-    sample_bsdf   the BSDF toward that point, and the next direction
-    direct_light  the lamp's light, weighted against BSDF sampling (MIS), if a shadow ray finds nothing in between
+    sample_bsdf   the value of the BSDF toward this point, and the next direction
+    direct_light  the light from the lamp, weighted by MIS with BSDF sampling, if the shadow ray is not blocked
     spawn         the ray in the next direction
     roulette      Russian roulette
-    trace         the first hit of that ray
+    trace         the first hit of this ray
 
-A vertex costs one call of its BSDF, which evaluates it toward a light and samples the next direction, and a shadow ray
-unless the light's contribution is zero.
+At each vertex, the BSDF is called once, to evaluate it toward a light and to sample the next direction. A shadow ray is
+traced unless the contribution of the light is zero.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from ..scattering import Vertex, keep_hero
 from ..scene_data import SceneData
 from .base import Integrator, Settings
 
-# Russian roulette begins at this depth, as in Mitsuba's `path`: before it, the throughput is rarely low enough for
-# roulette to pay off.
+# Russian roulette begins at this depth, as in Mitsuba's `path`, because the throughput is rarely low enough before.
 ROULETTE_DEPTH = 5
-# Ratio of the survival probability to the throughput. Early termination costs more than it saves: with a factor of 1,
-# rough glass has 1.3 times the error, a room 1.2, a soft sky 1.08, for 0 to 16 % less time.
+# The ratio of the survival probability to the throughput. Early termination increases the error too much: with a factor
+# of 1, the error is 1.3 times as large for rough glass, 1.2 times for a room and 1.08 times for a soft sky, in exchange
+# for 0 to 16 % less time.
 SURVIVAL = 4.0
 
-# Sample dimensions of a path: each vertex uses VERTEX_DIMENSIONS of them.
+# The sample dimensions of a path. Each vertex uses VERTEX_DIMENSIONS dimensions.
 FIRST_VERTEX = FIRST_FREE
 LIGHT, DIRECTION, LOBE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
 
@@ -48,17 +48,17 @@ class PathState:
     """The state of a path, one per lane."""
 
     index: UInt  # index of the sample
-    depth: UInt  # vertices passed so far: 0 at the first hit
+    depth: UInt  # number of vertices so far: 0 at the first hit
     ray: Ray  # the next segment
     hit: Hit  # first intersection of `ray`
     throughput: Radiance
-    eta: Float  # product of the relative indices along the path
+    eta: Float  # product of the relative indices of refraction along the path
     pdf: Float  # density with which the BSDF sampled `ray`, 1/sr; 0 for camera rays and delta lobes
     solid_angle: Float  # LightSample.solid_angle at the origin of `ray`
-    radiance: Radiance  # radiance accumulated so far
-    hero_only: UInt  # 1 if the path continues with its first wavelength alone
+    radiance: Radiance  # accumulated radiance
+    hero_only: UInt  # 1 if the path continues with only its first wavelength
     inside: UInt  # the media that contain `ray`, see `media.py`
-    active: Mask  # False once the path has ended: by its depth, by zero throughput, in `roulette`, or in `trace`
+    active: Mask  # False once the path has ended, because of its depth, zero throughput, `roulette` or `trace`
 
 
 @dataclass
@@ -73,10 +73,10 @@ class VertexNumbers:
 
 
 class LightTransport(Integrator):
-    """An integrator that follows light along paths: subclasses implement `bounce` and loop over it.
+    """The base class of integrators that trace paths. Subclasses implement `bounce` and call it in a loop.
 
-    samples_lights  whether vertices sample the lights
-    samples_lobes   whether vertices sample all lobes of the BSDF; delta lobes are always followed
+    samples_lights  whether lights are sampled at the vertices
+    samples_lobes   whether all lobes of the BSDF are sampled at the vertices; delta lobes are always sampled
     """
 
     samples_lights: ClassVar[bool] = True
@@ -92,15 +92,15 @@ class LightTransport(Integrator):
 
     @classmethod
     def depth(cls, settings: Settings) -> int:
-        """Maximum path length in segments; 2 is direct light."""
+        """The maximum path length in segments; 2 is direct illumination."""
         return 2
 
     def bounce(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
-        """The path after the vertex at its hit, and the features of that vertex (`SceneData.features`)."""
+        """The path after the vertex at its hit, and the features at this vertex (`SceneData.features`)."""
         raise NotImplementedError(f"{type(self).__name__} has no bounce")
 
     def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
-        """[r, g, b] and the features of a sample that ends at its first vertex."""
+        """The color, [r, g, b], and the features of a sample that ends at its first vertex."""
         path, features = self.bounce(self.camera_path(pixel, key, index), key)
         return [*self.data.rgb(path.radiance, path.ray.wavelengths), *features]
 
@@ -109,7 +109,7 @@ class LightTransport(Integrator):
     def camera_path(
         self, pixel: UInt, key: UInt, index: UInt, begins: Mask = True, wavelength: Float | None = None
     ) -> PathState:
-        """A sample's path up to its first hit, on the lanes `begins`."""
+        """The path of a sample up to its first hit, on the lanes `begins`."""
         ray, weight, hit = self.data.first_hit(pixel, key, index, begins, wavelength)
         return self._path(index, ray, hit, self.mi.Spectrum(weight), self.data.begins_path(hit))
 
@@ -137,7 +137,7 @@ class LightTransport(Integrator):
         )
 
     def numbers(self, path: PathState, key: UInt) -> VertexNumbers:
-        """The random numbers of the vertex at the path's hit."""
+        """The random numbers for the vertex at the path's hit."""
         mi, data, index = self.mi, self.data, path.index
         dimension = path.depth * VERTEX_DIMENSIONS + FIRST_VERTEX
         pair = data.direction_pair if self.lights.has_environment else data.pair  # on the sphere, or on a lamp
@@ -153,13 +153,15 @@ class LightTransport(Integrator):
     # ------------------------------------------------------------------ the steps at a vertex
 
     def intersect(self, path: PathState) -> tuple[Vertex, Radiance]:
-        """The surface at the path's hit, which `camera_path` or `trace` has computed, and the throughput there after
-        absorption by media along the ray. Traces no ray."""
+        """The surface at the path's hit, and the throughput after absorption by media along the ray.
+
+        No ray is traced, because `camera_path` or `trace` has already computed the hit.
+        """
         return self.data.vertex(path.hit, path.ray, path.inside, path.throughput, path.active)
 
     def emitted(self, path: PathState, vertex: Vertex) -> Radiance:
-        """Radiance along the path's ray, weighted against light sampling at its origin."""
-        lights, active, by_both = self.lights, path.active, path.pdf > 0  # otherwise only BSDF sampling can find it
+        """The radiance emitted along the path's ray, weighted by MIS with light sampling at its origin."""
+        lights, active, by_both = self.lights, path.active, path.pdf > 0  # otherwise only BSDF sampling can sample it
         emitted = lights.emitted(vertex.si, active)
         if self.samples_lights:
             compete = active & by_both & dr.any(emitted != 0)
@@ -168,16 +170,16 @@ class LightTransport(Integrator):
         return dr.select(active, emitted, 0)
 
     def sample_light(self, vertex: Vertex, u: VertexNumbers, active: Mask) -> LightSample | None:
-        """A sample of the direct light; None in a scene without lights."""
+        """A sample of the direct light; None if the scene has no lights."""
         return self.lights.sample(vertex.si, u.light, active) if self.lights.count else None
 
     def sample_bsdf(
         self, vertex: Vertex, light: LightSample | None, u: VertexNumbers, active: Mask
     ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
-        """(BSDF times cosine toward the light, the pdf of that direction, a BSDF sample, its weight).
+        """The BSDF times cosine toward the light, the pdf of this direction, a BSDF sample, and its weight.
 
-        If both pairs are needed, one call of the BSDF computes them all. Without a light the first two are 0; if only
-        lights are sampled, the last two are 0.
+        All are computed by one call of the BSDF. Without a light, the first two are 0; if only lights are sampled, the
+        last two are 0.
         """
         mi, scattering = self.mi, self.scattering
         value, pdf = mi.Spectrum(0), mi.Float(0)
@@ -195,7 +197,7 @@ class LightTransport(Integrator):
     def direct_light(
         self, vertex: Vertex, light: LightSample | None, value: Radiance, pdf: Float, active: Mask
     ) -> Radiance:
-        """The light of a light sample that the vertex reflects back along the path, weighted against BSDF sampling."""
+        """The light of a light sample that is scattered back along the path, weighted by MIS with BSDF sampling."""
         if light is None:
             return self.mi.Spectrum(0)
         si, reflected = vertex.si, value * light.weight
@@ -208,7 +210,7 @@ class LightTransport(Integrator):
         return dr.select(active, dr.select(visible, reflected, 0), 0)
 
     def ambient_light(self, vertex: Vertex, active: Mask) -> Radiance:
-        """Ambient radiance times the BSDF's attribute "ambient" (0 without one)."""
+        """The ambient radiance times the attribute "ambient" of the BSDF, or 0 if the BSDF does not have it."""
         assert self.ambient is not None
         si, bsdf = vertex.si, vertex.bsdf
         if self.mi.is_rgb:
@@ -218,8 +220,10 @@ class LightTransport(Integrator):
         return dr.select(active, reflected * self.ambient.eval(si, active), 0)
 
     def keep_hero(self, path: PathState, vertex: Vertex, throughput: Radiance, active: Mask) -> tuple[Radiance, UInt]:
-        """(throughput, limited to the first wavelength where a surface disperses; whether the path is limited to
-        it)."""
+        """The throughput, and whether the path is limited to its first wavelength.
+
+        At a surface that disperses light, the throughput is limited to the first wavelength.
+        """
         if not self.disperses:
             return throughput, path.hero_only
         here = active & ((vertex.bsdf.flags() & DISPERSES) != 0)
@@ -228,8 +232,10 @@ class LightTransport(Integrator):
     def spawn(
         self, path: PathState, vertex: Vertex, bs: BSDFSample, light: LightSample | None, active: Mask
     ) -> PathState:
-        """The path with a ray in the sampled direction (Mitsuba's `spawn_ray`, see `bridge.faults.ray_offset`). `path`
-        already includes the vertex's radiance and the throughput after it."""
+        """The path with a ray in the sampled direction, like Mitsuba's `spawn_ray` (see `bridge.faults.ray_offset`).
+
+        path  the path after the vertex, with its accumulated radiance and throughput
+        """
         mi = self.mi
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         active = active & dr.any(path.throughput != 0) & (self.samples_lobes | delta)
@@ -245,9 +251,10 @@ class LightTransport(Integrator):
         )
 
     def roulette(self, path: PathState, u: VertexNumbers) -> PathState:
-        """Russian roulette: the survival probability is SURVIVAL times the throughput's largest channel, at most 0.95.
+        """Russian roulette. The survival probability is SURVIVAL times the largest channel of the throughput, at most
+        0.95.
 
-        Inside glass, radiance is scaled by eta^2, which is undone on exit; this does not make a path more important.
+        The factor eta^2 by which radiance is scaled inside glass is ignored, because it is undone on exit.
         """
         throughput = path.throughput
         survive = dr.clip(SURVIVAL * dr.max(dr.detach(throughput)) * dr.square(path.eta), 1e-6, 0.95)
@@ -256,13 +263,13 @@ class LightTransport(Integrator):
         return replace(path, throughput=dr.select(plays, throughput / survive, throughput), active=active)
 
     def trace(self, path: PathState) -> PathState:
-        """The path with the first hit of its ray; a path that hits nothing ends, unless there is an environment."""
+        """The path with the first hit of its ray. A path without a hit ends, unless there is an environment."""
         hit = self.data.surfaces.nearest(path.ray, path.active)
         active = path.active if self.lights.has_environment else path.active & hit.is_valid()
         return replace(path, hit=hit, active=active)
 
     def light_along(self, path: PathState, active: Mask) -> Radiance:
-        """The light along the path's ray times the throughput, for rays whose first surface is not needed otherwise."""
+        """The light along the path's ray times the throughput, for rays whose first hit is not needed otherwise."""
         if self.media.known:
             path = self.trace(replace(path, active=active))
             vertex, throughput = self.intersect(path)

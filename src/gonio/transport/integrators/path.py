@@ -16,7 +16,7 @@ from .light_transport import LightTransport, PathState
 
 
 class Path(LightTransport):
-    """Path tracing: light and BSDF sampling combined at every vertex (max_depth - 1 shaded vertices)."""
+    """Path tracing with light and BSDF sampling at every vertex (max_depth - 1 shaded vertices)."""
 
     name = "path"
     takes_depth = True
@@ -25,12 +25,12 @@ class Path(LightTransport):
     def __init__(self, data: SceneData, settings: Settings) -> None:
         super().__init__(data, settings)
         depth = self.depth(settings)
-        # The last ray can only contribute emission. With one bounce, or if the only lamp is a rectangle, the vertex
-        # before it adds this light (`light_along`). Otherwise it is a ray like the others, since media attenuate it or
-        # any of several lights may be its first hit; a separate case would add a second ray and its surface to each
-        # vertex.
+        # The last ray can only contribute emission. If there is only one bounce, or if the only lamp is a rectangle,
+        # the vertex before it adds this light (`light_along`). Otherwise, media may attenuate it, or any of several
+        # lights may be the first hit, and it is treated like the other rays; a separate case would add a second ray and
+        # its surface to each vertex.
         self.last_ray_apart = not self.media.known and (depth <= 2 or self.lights.shortens_last_ray)
-        # paths of one vertex need no loop over vertices: `Integrator.accumulate` loops over samples alone
+        # paths with one vertex do not need a loop over vertices; `Integrator.accumulate` loops only over samples
         self.one_bounce = (depth <= 2 and self.last_ray_apart) or not (self.samples_lobes or self.smooth)
 
     @classmethod
@@ -41,10 +41,10 @@ class Path(LightTransport):
         return advice.on_small_lights(self.data) if self.settings.max_depth > 2 else ""
 
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
-        """Add samples [first, last) of every pixel to the sums: one flat loop over the vertices of all of them.
+        """Add samples [first, last) of every pixel to the sums, in a single loop over the vertices of all samples.
 
-        A lane whose path has ended starts its next path at once, instead of idling until the longest of the 16 paths in
-        its vector has ended.
+        If a path ends, its lane starts the next path at once instead of waiting until the longest of the 16 paths in
+        the vector has ended.
         """
         if self.one_bounce:
             return super().accumulate(pixel, key, first, last, sums)
@@ -61,13 +61,13 @@ class Path(LightTransport):
         return dr.while_loop(state, lambda index, *_: index < last, step, mode="symbolic", label="vertices")[2]
 
     def bounce(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
-        """Add the emission of the surface that the path's ray has hit and its direct light, and trace the next ray."""
+        """Add the emission of the surface that the ray has hit and its direct illumination, and trace the next ray."""
         vertex, throughput = self.intersect(path)
         radiance = path.radiance + throughput * self.emitted(path, vertex)
         active = path.active & vertex.si.is_valid() & (path.depth + 1 < self.max_depth)
         throughput, hero_only = self.keep_hero(path, vertex, throughput, active)
 
-        # Light sampling; the same call of the BSDF samples the next direction.
+        # Light sampling; the same call of the BSDF also samples the next direction.
         u = self.numbers(path, key)
         light = self.sample_light(vertex, u, active)
         light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
@@ -75,7 +75,7 @@ class Path(LightTransport):
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(vertex, active)
 
-        # BSDF sampling: the next ray, whose emission the next vertex adds.
+        # BSDF sampling: the next ray. The next vertex adds the emission along it.
         throughput = throughput * weight
         features = self.data.features(throughput, vertex.si, path.active, active)
         path = replace(path, throughput=throughput, radiance=radiance, hero_only=hero_only)

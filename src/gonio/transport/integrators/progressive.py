@@ -1,11 +1,11 @@
-"""Progressive rendering: passes of samples that are added to a film (`Sums`), and its development into a picture.
+"""Progressive rendering: passes of samples are added to a film (`Sums`), from which the picture is computed.
 
 Performance:
 
-- One lane holds one pixel, and one kernel iterates over samples [first, first + count) of it, adding them up in
-  registers. Memory does not grow with samples; first, count, seed, camera and every parameter of the scene are
-  data of the kernel, so nothing is recompiled when they change.
-- Lanes are pixels in 4 x 4 tiles, so that the 16 rays of a vector are coherent and mostly hit the same objects.
+- Each lane renders one pixel: a kernel iterates over samples [first, first + count) and adds them up in registers.
+  Memory does not grow with the number of samples. The numbers first and count, the seed, the camera and every parameter
+  of the scene are kernel data, so nothing is recompiled when they change.
+- Lanes are ordered by 4 x 4 tiles of pixels, so the 16 rays of a vector are coherent and mostly hit the same objects.
 """
 
 from __future__ import annotations
@@ -30,30 +30,31 @@ from ..scene_data import SceneData
 from ..sums import Sums
 from .base import Integrator, Settings
 
-# 4 x 4 pixels fill the 16 lanes of AVX-512 and two packets of AVX2: on the five-conductor scene the same rays take
-# 0.21 s in tiles and 0.32 s in scanlines.
+# A tile of 4 x 4 pixels fills the 16 lanes of AVX-512 or two packets of AVX2. In the five-conductor scene, tracing the
+# same rays takes 0.21 s in tiles and 0.32 s in scanlines.
 TILE = 4
 
-LANES = "lanes"  # key of a state: samples per lane
+LANES = "lanes"  # key of the number of samples per lane in a state
 
-SHARE = 16  # a lane's number of samples is given in sixteenths of the mean
+SHARE = 16  # the number of samples of a lane is given in sixteenths of the mean
 
-# In the first pass all lanes read the same zero, since writing a zero for each lane of a large film takes as long as
-# its first sample. The array has several entries, since Dr.Jit makes a different kernel for arrays with one entry.
+# In the first pass, all lanes read the same zeros, because writing a zero for each lane of a large film takes as long
+# as its first sample. There are several entries because Dr.Jit compiles a different kernel for arrays with one entry.
 NOTHING = 16
 
 
 class Render:
-    """A progressive render: call `advance` until there are enough samples, read `image` at any time.
+    """A progressive render: call `advance` until there are enough samples; `image` can be called at any time.
 
-    scene     a loaded Mitsuba scene; its parameters may change between renders, not between passes
+    scene     a loaded Mitsuba scene, whose parameters may change between renders, but not between passes
     settings  integrator, depth, sampler and seed
-    sensor    the camera; None: the scene's first one. Its film determines the size; the pixel filter is a box
-    aovs      whether to average albedo and normal of the first hit too, for the denoiser
-    share     relative number of samples per lane, with a mean of SHARE over the picture; None: equal for all
+    sensor    the camera, whose film determines the size of the picture; None selects the first camera of the scene. The
+              pixel filter is a box
+    aovs      whether to also average the albedo and the normal of the first hit, for the denoiser
+    share     relative number of samples per lane, with a mean of SHARE over the picture; None if it is the same for all
     """
 
-    features = 0  # number of values that a subclass adds up besides the radiance
+    features = 0  # number of values that a subclass accumulates in addition to the radiance
 
     def __init__(
         self,
@@ -74,45 +75,46 @@ class Render:
         self.sensor = sensor if sensor is not None else scene.sensors()[0]
         self.width, self.height = (int(n) for n in self.sensor.film().crop_size())
         self.done = 0
-        self._lanes: UInt | None = None  # samples per lane, if some are ahead of `done`
+        self._lanes: UInt | None = None  # samples per lane, if some lanes are ahead of `done`
         self._share = None if share is None else own(mi.UInt32, share)
         self._order = tiles(self.width, self.height)
         self._pixel = own(mi.UInt32, self._order)
         self._splatted = self.width * self.height if settings.program.splats else 0
-        # A newly loaded camera and one that was moved hold the same numbers in arrays created in different order, which
-        # would give two kernels; this call puts both into the second state.
+        # The arrays of a newly loaded camera and of a moved one are created in a different order, which would cause two
+        # kernels; this call creates the order of a moved camera.
         self.sensor.parameters_changed()
         with dr.suspend_grad(), garbage.paused(), denormals_rounded():
             self._integrator = self._integrator_of()
         self._sums = self._nothing(NOTHING)
 
     def _nothing(self, lanes: int) -> Sums:
-        """Sums of zero samples."""
+        """Empty sums."""
         features = 6 if self.aovs else self.features
         return Sums.zeros(self.mi, lanes, 3 + self._integrator.measured, features, self._splatted)
 
     def _integrator_of(self, data: Callable[..., SceneData] = SceneData) -> Integrator:
-        """The integrator with its scene data."""
+        """The integrator, with its scene data."""
         settings, program = self.settings, self.settings.program
         parts = self.mi, self.scene, self.sensor, settings.sampler, settings.ambient
         return program(data(*parts, mis_compensation=program.samples_lobes, aovs=self.aovs), settings)
 
     @property
     def advice(self) -> str:
-        """Advice to a user who chose this integrator for this scene; "" if there is none."""
+        """Advice to the user about the choice of this integrator for this scene; "" if there is none."""
         with dr.suspend_grad():
             return self._integrator.advice()
 
     def advance(self, count: int) -> None:
-        """Render `count` more samples of every pixel; returns when they are done.
+        """Render `count` more samples of every pixel, and wait until they are finished.
 
-        Sums have 64 bits and are added in the order of the samples: passes of any size give bit-identical sums. An
-        interrupted pass leaves the picture unchanged.
+        Samples are accumulated in double precision and in order, so passes of any size give bit-identical sums. If a
+        pass is interrupted, the picture remains unchanged.
         """
         if count < 1:
             raise InputError(f"{count} samples requested", "advance", "give 1 or more")
         mi = self.mi
-        # Dr.Jit would record each loop a second time without its invariant variables; LLVM eliminates these anyway.
+        # Otherwise Dr.Jit would record each loop a second time without invariant variables, which LLVM eliminates
+        # anyway.
         unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
         with dr.suspend_grad(), garbage.paused(), interruptible(), unchanged, denormals_rounded():
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
@@ -121,7 +123,7 @@ class Render:
             lanes, until = self._lanes, dr.opaque(mi.UInt32, highest)
             if self._share is not None:
                 lanes, until = self._shared(lowest) if lanes is None else lanes, self._shared(highest)
-            if lanes is not None:  # some lanes are ahead, and continue or wait
+            if lanes is not None:  # some lanes are ahead of others
                 until = dr.maximum(lanes, until)
                 dr.eval(lanes, until)
                 lowest, highest = int(dr.min(lanes)[0]), int(dr.max(until)[0])
@@ -138,7 +140,7 @@ class Render:
         self._lanes = None if self._share is None else until
 
     def _shared(self, done: int) -> UInt:
-        """Samples per lane at a mean of `done` over the picture."""
+        """The number of samples per lane if their mean over the picture is `done`."""
         mi = self.mi
         return mi.UInt32(mi.UInt64(self._share) * dr.opaque(mi.UInt64, done) // SHARE)
 
@@ -148,16 +150,16 @@ class Render:
         return self.done > 0 or self._lanes is not None
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """The sums so far, as arrays with one entry per lane that do not change while more is rendered."""
+        """The accumulated samples, as arrays with one entry per lane, which later passes do not change."""
         if not self._begun:
             return self._nothing(len(self._pixel)).arrays()
         ahead = {} if self._lanes is None else {LANES: np.asarray(self._lanes)}
         return {**self._sums.arrays(), **ahead}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Resume from the sums of `done` samples, with bit-identical results.
+        """Continue from the accumulated samples of `done` samples per pixel, with bit-identical results.
 
-        Raises ValueError for the sums of another film.
+        Raises ValueError if the state is that of another film.
         """
         lanes = state.get(LANES)
         if lanes is not None and (lanes.shape != (len(self._pixel),) or lanes.dtype != np.uint32):
@@ -168,13 +170,13 @@ class Render:
             self._lanes = own(self.mi.UInt32, lanes)
 
     def select(self, lanes: slice) -> None:
-        """Restart with only these lanes, for a caller that assembles the picture from parts."""
+        """Restart with only the given lanes, for a caller that assembles the picture from parts."""
         self._pixel = own(self.mi.UInt32, self._order[lanes])
         self._sums = self._nothing(NOTHING)
         self.done, self._lanes = 0, None
 
     def image(self) -> NDArray[np.float32]:
-        """The mean of the samples so far: (height, width, 3) float32, linear RGB, row 0 on top."""
+        """The mean of all samples so far, (height, width, 3), float32, linear RGB, with row 0 on top."""
         picture = self._mean(self._sums.radiance[:3])
         if self._splatted and self._begun:
             scale = self._integrator.unit / max(self.done, 1)
@@ -183,15 +185,19 @@ class Render:
         return picture
 
     def differences(self) -> list[NDArray[np.float32]]:
-        """Several estimates, from independent samples, of the difference from a less blurred picture: unbiased but
-        noisy, (height, width, 3) each. [] for an integrator without blur."""
+        """Estimates of the difference from a less blurred picture, (height, width, 3) each.
+
+        They come from independent samples, and are unbiased but noisy. The list is empty for an integrator without
+        blur.
+        """
         return self._integrator.differences(self._mean(self._sums.radiance[3:]), self.done)
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
-        """Features of the first hit for a denoiser, averaged over the same samples: {"albedo", "normal"}, (h, w, 3).
+        """The features of the first hit for a denoiser, "albedo" and "normal", (height, width, 3) each.
 
-        Albedo is the mean of the BSDF's sampling weight, that is, the fraction of uniform illumination that reaches the
-        camera: for a metal its color, for a mirror or glass about 1.
+        They are averaged over the same samples as the picture. The albedo is the mean of the BSDF's sampling weight,
+        that is, the fraction of uniform illumination that reaches the camera. For a metal, it is the color; for a
+        mirror or glass, it is about 1.
         """
         if not self.aovs:
             raise InputError("features were not rendered", "Render.aov", "make the Render with aovs=True")
@@ -199,12 +205,14 @@ class Render:
 
     @property
     def invalid(self) -> int:
-        """Number of values so far that were not finite and were skipped; any above 0 indicates a defect in a BSDF or
-        light."""
+        """The number of values so far that were not finite and were skipped.
+
+        If it is not 0, a BSDF or a light is defective.
+        """
         return int(dr.sum(self._sums.invalid)[0])
 
     def _mean(self, channels: Sequence[Float]) -> NDArray[np.float32]:
-        """The mean of each channel, (height, width, channels)."""
+        """The mean of each channel, as a picture, (height, width, channels)."""
         mi = self.mi
         shape = (self.height, self.width, len(channels))
         if not self._begun:
@@ -219,9 +227,9 @@ class Render:
 
 
 def tiles(width: int, height: int) -> NDArray[np.uint32]:
-    """The pixel (row * width + column) of each lane: tiles of TILE x TILE, row by row, without padding."""
+    """The pixel (row * width + column) of each lane: pixels are ordered by tiles of TILE x TILE, without padding."""
     pixels = np.arange(height * width, dtype=np.uint32).reshape(height, width)
-    edge = width - width % TILE  # beyond it tiles are narrower
+    edge = width - width % TILE  # tiles beyond this column are narrower
     order = np.empty(height * width, np.uint32)
     at = 0
     for top in range(0, height, TILE):

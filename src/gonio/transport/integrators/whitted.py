@@ -9,7 +9,7 @@ DEPTH = 10
 
 
 class Whitted(Path):
-    """Whitted ray tracing: mirrors and smooth glass to depth 10, direct light by light sampling elsewhere."""
+    """Whitted ray tracing: mirrors and smooth glass to depth 10, and light sampling at other surfaces."""
 
     name = "whitted"
     takes_depth = False

@@ -33,13 +33,15 @@ def register(mi: ModuleType) -> None:
 
         {"type": "rectangle", "emitter": {"type": "gonio_area", "radiance": {"type": "rgb", "value": [50, 50, 50]}}}
 
-    radiance  emitted radiance, W/(m^2 sr), the same in every direction on **both** sides; rgb, spectrum or texture
+    radiance  emitted radiance, W/(m^2 sr), which is the same in all directions on **both** sides: an rgb, a spectrum or
+              a texture
 
-    tag       an arbitrary string. Mitsuba's loader merges Python plugins with equal properties, and then rejects one
-              emitter on two shapes: lamps of equal radiance need different tags, or `load_dict(..., optimize=False)`
+    tag       an arbitrary string. Mitsuba's loader merges Python plugins with equal properties, and then rejects an
+              emitter that belongs to two shapes. Lamps with equal radiance therefore require different tags, or
+              `load_dict(..., optimize=False)`
 
-    The light is sampled by solid angle on rectangles and spheres, by area on other shapes. It does not support light
-    tracing (`sample_ray` is missing).
+    Rectangles and spheres are sampled by solid angle, other shapes by area. The plugin does not support light tracing,
+    because `sample_ray` is missing.
     """
     if mi.variant() not in _registered:
         _registered.add(mi.variant())
@@ -69,9 +71,9 @@ def _light_class(mi: ModuleType) -> OfVariant:
             shape = self.get_shape()
             if is_rectangle(mi, shape):
                 ds = direction_sample(mi, SphericalRectangle(Rectangle.of(mi, shape), it.p), sample, it)
-            elif is_sphere(mi, shape):  # Mitsuba's samples have a wrong uv, and are too bright for small spheres
+            elif is_sphere(mi, shape):  # Mitsuba's samples have a wrong uv and are too bright for small spheres
                 ds = direction_sample(mi, SphericalCap(mi, Ball.of(mi, shape), it.p), sample, it)
-            else:  # Mitsuba's sampling of meshes omits points whose normal faces away
+            else:  # Mitsuba's sampling of meshes omits points whose normals face away
                 ds = area_sample(mi, shape.sample_position(it.time, sample, active), it)
             active = mi.Bool(active) & (ds.pdf > 0)
             ds.emitter = mi.EmitterPtr(self)

@@ -1,4 +1,4 @@
-"""The environment as a light, sampled by Mitsuba or by the density of `sky.py`."""
+"""Samplers of the environment, which use Mitsuba's method or the density of `sky.py`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .sky import Sky
 
 
 class Environment(LightSampler):
-    """The light of rays that leave the scene, sampled by Mitsuba."""
+    """The environment, which rays hit if they leave the scene, sampled by Mitsuba."""
 
     def __init__(self, surfaces: Surfaces, emitter: Emitter) -> None:
         self.mi, self.surfaces, self.emitter = surfaces.mi, surfaces, emitter
@@ -30,7 +30,7 @@ class Environment(LightSampler):
 
 
 class VaryingEnvironment(Environment):
-    """An environment map that is sampled by its luminance."""
+    """An environment map that is sampled according to its luminance."""
 
     def __init__(self, surfaces: Surfaces, emitter: Emitter, sky: Sky) -> None:
         super().__init__(surfaces, emitter)
@@ -50,7 +50,7 @@ class VaryingEnvironment(Environment):
 def environment(surfaces: Surfaces, emitter: Emitter, mis_compensation: bool) -> Environment:
     """The sampler of an environment.
 
-    mis_compensation  whether BSDFs are sampled too; BSDF sampling then covers the uniform part of a map (Karlik2019)
+    mis_compensation  whether BSDFs are sampled too, so that the density of a map can omit its uniform part (Karlik2019)
     """
     if "data" in dict(surfaces.mi.traverse(emitter)):
         sky = Sky(surfaces.mi, surfaces.scene, emitter, mis_compensation)

@@ -1,4 +1,4 @@
-"""All lights except the environment, sampled by calls to Mitsuba's emitters from the kernel."""
+"""The sampler of all lights except the environment, which calls Mitsuba's emitters from the kernel."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ Answer = TypeVar("Answer")
 
 
 class Lamps(LightSampler):
-    """Lights with a surface, point lights and beams, as Mitsuba samples them.
+    """Lights with a surface, point lights and beams, sampled by Mitsuba.
 
     emitters       all lights of the scene, in the order of `Lights`
-    scene_indices  their positions in `scene.emitters()`
-    environment    position of the environment in `emitters`, -1 if there is none
+    scene_indices  positions of the lights in `scene.emitters()`
+    environment    position of the environment in `emitters`; -1 if there is none
     """
 
     def __init__(self, surfaces: Surfaces, emitters: Sequence[Emitter], scene_indices: UInt, environment: int) -> None:
@@ -49,7 +49,7 @@ class Lamps(LightSampler):
         lamps = [emitter for i, emitter in enumerate(emitters) if i != environment]
         self.lone = lamps[0] if len(lamps) == 1 else None
         shape = emitters[0].get_shape() if len(emitters) == 1 else None
-        # Also kernel data: the numbers of shapes depend on which other scenes exist.
+        # This is kernel data too, because the numbers of shapes depend on other scenes that exist.
         self.lone_shape = None if shape is None else dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
         dr.make_opaque(self.lone_shape)
         by_area = [must_sample_by_area(mi, emitter) for emitter in emitters]
@@ -57,7 +57,7 @@ class Lamps(LightSampler):
         dr.make_opaque(self.by_area)
 
     def emitter(self, index: UInt, active: Mask) -> Emitter:
-        """The emitter with this index; a single lamp is called directly instead of by pointer, which is faster."""
+        """The emitter with this index. A single lamp is called directly, which is faster than through a pointer."""
         if self.lone is not None:
             return self.lone
         place = dr.gather(self.mi.UInt32, self.scene_indices, index, active)
@@ -81,7 +81,7 @@ class Lamps(LightSampler):
     def _asked(
         self, emitter: Emitter, index: UInt, si: SurfaceInteraction, u: Point, active: Mask
     ) -> tuple[DirectionSample, Radiance]:
-        """Mitsuba's own sample of a light; where that is incorrect, a point sampled by area."""
+        """Mitsuba's own sample of a light, or a point sampled uniformly by area if Mitsuba's method is incorrect."""
         if self.by_area is None:
             own: tuple[DirectionSample, Radiance] = emitter.sample_direction(si, u, active)
             return own
@@ -93,7 +93,7 @@ class Lamps(LightSampler):
         return dr.select(here, near, ds), dr.select(here & (near.pdf > 0), sent / near.pdf, weight & ~here)
 
     def sent(self, emitter: Emitter, ds: DirectionSample, si: SurfaceInteraction, active: Mask) -> Radiance:
-        """Radiance of a lamp toward `si` from a point on the lamp."""
+        """The radiance of a lamp toward `si`, from a point on the lamp."""
         at_light = self.mi.SurfaceInteraction3f(ds, si.wavelengths)
         at_light.wi = at_light.to_local(-ds.d)
         return emitter.eval(at_light, active)
@@ -110,7 +110,7 @@ class Lamps(LightSampler):
     # ------------------------------------------------------------------ points on a lamp
 
     def on_area(self, emitter: Emitter, index: UInt, u: Point, active: Mask) -> PositionSample:
-        """A point of a lamp, uniform by area, from two numbers in [0, 1)."""
+        """Sample a point on a lamp uniformly by area, with two random numbers in [0, 1)."""
         mi = self.mi
         nothing: PositionSample = dr.zeros(mi.PositionSample3f)
         ps = self.of_shape(emitter, index, lambda shape, *args: shape.sample_position(0.0, *args), nothing, u, active)
@@ -121,11 +121,11 @@ class Lamps(LightSampler):
     def of_shape(
         self, emitter: Emitter, index: UInt, ask: Callable[..., Answer], nothing: Answer, *args: OfVariant
     ) -> Answer:
-        """`ask(shape, *args)` for a lamp's shape; `nothing` for a lamp without one."""
+        """`ask(shape, *args)` for the shape of a lamp; `nothing` for a lamp without a shape."""
         if len(self.emitters) == 1 or not self.has_instances:
             return ask(self.emitters[0].get_shape() if len(self.emitters) == 1 else emitter.get_shape(), *args)
 
-        # An instance, which a call from the kernel would include, has no area.
+        # An instance has no area, but a call from the kernel would include it.
         def answer(shape: Shape | None) -> Callable[..., Answer]:
             return lambda *args: nothing if shape is None else ask(shape, *args)
 
@@ -138,8 +138,10 @@ class Lamps(LightSampler):
 
     @cached_property
     def spheres(self) -> Float | None:
-        """Four numbers per lamp: center and radius of a sphere, where a negative radius means that the normal points
-        inward; 0 for other lamps. None if no lamp is a sphere."""
+        """The center and radius of each lamp that is a sphere; 0 for other lamps, and None if no lamp is a sphere.
+
+        A negative radius means that the normal points inward.
+        """
         mi = self.mi
         rows, read = np.zeros((len(self.emitters), 4)), placement_reader(mi)
         for row, emitter in zip(rows, self.emitters, strict=True):

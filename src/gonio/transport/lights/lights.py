@@ -1,4 +1,4 @@
-"""The lights of a scene: their samplers, the choice among them, and their weights against BSDF sampling."""
+"""The lights of a scene: their samplers, the selection of a light, and the MIS weights for BSDF sampling."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from .lamps import Lamps
 
 
 class Choice(Protocol):
-    """A rule that chooses one of several lights for a sample at a point."""
+    """The interface of rules that select one of several lights for a sample at a point."""
 
     def choose(self, p: Point, u: Float) -> tuple[UInt, Float, Float]:
-        """(index of a light, `u` rescaled to [0, 1] for reuse, the light's probability)."""
+        """Select a light. Returns its index, `u` rescaled to [0, 1] for reuse, and the probability of the light."""
         ...
 
     def probability(self, p: Point, index: UInt, active: Mask) -> Float:
-        """The probability that `choose` returns this light."""
+        """The probability with which `choose` selects this light."""
         ...
 
 
 class Lights:
-    """The lights of a scene, as integrators use them.
+    """The lights of a scene, with the methods that integrators use.
 
-    emitters  Mitsuba's emitters, in an order that does not change between runs; `index` is a position among them
-    samplers  samplers of the environment and of the lamps: the fastest that support them (`fast/`)
-    lamps     the sampler of all lights except the environment
+    emitters  Mitsuba's emitters, in an order that does not change between runs; `index` is a position in this list
+    samplers  samplers of the environment and of the lamps; the fastest suitable ones are used (`fast/`)
+    lamps     sampler of all lights except the environment
 
-    mis_compensation  whether BSDFs are sampled too; BSDF sampling then covers the uniform part of an environment map
+    mis_compensation  whether BSDFs are sampled too, so that the density of an environment map can omit its uniform part
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, surfaces: Surfaces | None = None, mis_compensation: bool = False):
@@ -69,7 +69,7 @@ class Lights:
         return self.mi.has_flag(flags, kinds.Infinite) and not self.mi.has_flag(flags, kinds.DeltaDirection)
 
     def _prepare_choice(self) -> None:
-        """Prepare the probabilities of the lights, and tables indexed by Dr.Jit's pointers to them."""
+        """Prepare the probabilities of the lights, and tables that are indexed by Dr.Jit's pointers to the lights."""
         mi = self.mi
         self.probability = self._probabilities()
         self.by_power = mi.DiscreteDistribution(self.probability)
@@ -90,20 +90,22 @@ class Lights:
         return TabledLamps.of(*parts, pointers, self.index_of_pointer if self.count > 1 else None) or Lamps(*parts)
 
     def _probabilities(self) -> Float:
-        """Probabilities of the lights: half uniform, half proportional to the mean unoccluded light at 256 points in
-        the scene's bounding box.
+        """The probabilities of the lights.
 
-        The uniform half limits every light's weight to 2 n: a dim lamp next to an object may matter most there.
+        One half of the probability is uniform. The other half is proportional to the mean unoccluded light at 256
+        points in the bounding box of the scene. With n lights, the uniform half limits the weight of every light to
+        2 n, because a dim lamp next to an object may be the most important one there.
         """
         mi = self.mi
         index = dr.arange(mi.UInt32, 256)
         it = dr.zeros(mi.SurfaceInteraction3f, 256)
         box = self.scene.bbox()
         if box.valid():
-            # Multiples mod 1 of 1/x, 1/x^2, 1/x^3, where x^4 = x + 1 (R3 sequence, M. Roberts): even and deterministic.
+            # Multiples of 1/x, 1/x^2 and 1/x^3, modulo 1, where x^4 = x + 1, are evenly distributed and deterministic
+            # (R3 sequence, M. Roberts).
             spread = mi.Point3f(*(fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
             low, extents = mi.Point3f(box.min), mi.Vector3f(box.extents())
-            dr.make_opaque(low, extents)  # kernel data: literals would give a kernel per scene size
+            dr.make_opaque(low, extents)  # kernel data: literals would cause a new kernel for each scene size
             it.p = low + spread * extents
         if mi.is_spectral:
             it.wavelengths = type(it.wavelengths)(550)
@@ -118,7 +120,7 @@ class Lights:
         return mi.Float([0.5 / self.count + 0.5 * fraction for fraction in fractions])
 
     def _of_pointer(self, values: Float) -> Float:
-        """A value per light, indexed by Dr.Jit's number of the emitter (the content of an EmitterPtr)."""
+        """A table of one value per light, indexed by Dr.Jit's number of the emitter (the content of an EmitterPtr)."""
         mi = self.mi
         number = dr.reinterpret_array(mi.UInt32, self.scene.emitters_dr())
         table = dr.zeros(type(values), int(dr.max(number)[0]) + 1)
@@ -129,7 +131,7 @@ class Lights:
     # ------------------------------------------------------------------ used by integrators
 
     def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
-        """Radiance from the surface at `si` along the ray, or from the environment if the ray left the scene."""
+        """The radiance emitted along the ray by the surface at `si`, or by the environment if the ray left it."""
         radiance = self.mi.Spectrum(0)
         for sampler in self.samplers:
             owns = sampler.owns(si)
@@ -137,11 +139,10 @@ class Lights:
         return radiance
 
     def sample(self, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
-        """A direction toward a light. `u` is in [0, 1)^2: x selects the light; the rescaled x and y select a point on
-        it.
+        """Sample a direction toward a light with two random numbers `u` in [0, 1)^2.
 
-        With a separate number for the choice, each light would get a random subset of all points, which is as uneven as
-        random points.
+        u.x selects the light; u.x, rescaled, and u.y select a point on it. If the light were selected with a separate
+        number, each light would get a random subset of the points, which is not stratified.
         """
         mi = self.mi
         if self.count == 1:
@@ -159,9 +160,9 @@ class Lights:
         return light
 
     def pdf(self, origin: Point, solid_angle: Float, si: SurfaceInteraction, active: Mask) -> Float:
-        """Density (1/sr) with which `sample` at `origin` would have chosen the direction of the light at `si`.
+        """The density (1/sr) with which `sample` at `origin` would have generated the direction to the light at `si`.
 
-        solid_angle  `LightSample.solid_angle` at that origin, so that it is not computed twice
+        solid_angle  `LightSample.solid_angle` at this origin, so that it is not computed twice
         """
         mi = self.mi
         if self.count == 0:
@@ -177,25 +178,28 @@ class Lights:
         return density * self.choice.probability(origin, index, active)
 
     def mis_weight(self, pdf: Float, other: Float) -> Float:
-        """Weight of one of two sampling strategies (lights, BSDFs) with one sample each and densities `pdf` and
-        `other`.
+        """The MIS weight of a sample with density p = `pdf`, where the other strategy has the density q = `other`.
 
-        The power heuristic p^2 / (p^2 + q^2) (Veach1997); for a compensated environment map the balance heuristic
-        p / (p + q), which has 5 to 10 % less error there (Karlik2019).
+        The two strategies are light and BSDF sampling, with one sample each. The weight is that of the power heuristic,
+        p^2 / (p^2 + q^2) (Veach1997). For a compensated environment map, it is that of the balance heuristic, p / (p +
+        q), whose error is 5 to 10 % less in this case (Karlik2019).
         """
-        ratio = other / pdf  # ratio first: p^2 itself overflows for narrow lobes
+        ratio = other / pdf  # the ratio is computed first, because p^2 overflows for narrow lobes
         compensated = any(isinstance(sampler, VaryingEnvironment) for sampler in self.samplers)
         both = ratio + 1 if compensated else dr.fma(ratio, ratio, 1)
         return dr.select(pdf > 0, dr.rcp(both), 0)
 
     @property
     def shortens_last_ray(self) -> bool:
-        """Whether `along` finds no nearest surface: it traces a shadow ray, and only if the ray points at the light."""
+        """Whether `along` traces only a shadow ray, and only if the ray points at the light, but no nearest surface."""
         return isinstance(self.lamps, RectangleLight)
 
     def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:
-        """(radiance along a ray, density as in `pdf`): one pair, or several if lights do not occlude one another, as in
-        `foreground.py`. Surfaces that do not emit contribute nothing."""
+        """The radiance along a ray, and its density as in `pdf`, in a list of pairs.
+
+        There is one pair, or several if lights do not occlude each other, as in `foreground.py`. Surfaces that do not
+        emit light contribute nothing.
+        """
         if isinstance(self.lamps, RectangleLight):
             return [self.lamps.along(ray, solid_angle, active)]
         hit = self.surfaces.nearest(ray, active)
@@ -205,8 +209,7 @@ class Lights:
 
 
 class PowerChoice:
-    """The same probabilities everywhere: half uniform, half proportional to the light that a lamp sends into the
-    scene."""
+    """Selects lights with probabilities that do not depend on the point, see `Lights._probabilities`."""
 
     def __init__(self, by_power: Choice) -> None:
         self._by_power = by_power

@@ -1,8 +1,9 @@
-"""Directions toward an environment, with a density proportional to its luminance.
+"""Sample directions toward an environment with a density proportional to its luminance.
 
-A grid, uniform in longitude and colatitude, holds one luminance per cell; within a cell, directions are uniform. If
-BSDFs are sampled too (multiple importance sampling), the grid holds the excess over the mean of the sphere: BSDF
-sampling covers the uniform part, and light sampling concentrates on the rest (Karlik2019).
+A grid, uniform in longitude and colatitude, contains one luminance per cell; within a cell, directions are uniformly
+distributed. If BSDFs are sampled too (multiple importance sampling), the grid contains the excess over the mean
+luminance of the sphere: BSDF sampling covers the uniform part, and light sampling concentrates on the rest
+(Karlik2019).
 """
 
 from __future__ import annotations
@@ -16,17 +17,17 @@ from numpy.typing import NDArray
 from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Emitter, Float, Interaction, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt, Vector
 
-# Cells in longitude, twice as many as in colatitude: as fine as the map, up to 0.35 degrees.
+# The number of cells in longitude, twice that in colatitude, matches the resolution of the map, up to 0.35 degrees.
 MIN_WIDTH, MAX_WIDTH = 64, 1024
-MIN_PART = 0.05  # fraction of its luminance that each cell retains, since some materials sample their lobes poorly
-SHORT = 16  # largest number of entries of a row that is searched by bisection alone
-MAX_STEPS = 4  # largest number of steps per axis in which a cell is evaluated; enough for maps 4096 texels wide
+MIN_PART = 0.05  # fraction of its luminance that each cell retains, because some materials sample their lobes poorly
+SHORT = 16  # maximum number of entries of a row that is searched only by bisection
+MAX_STEPS = 4  # maximum number of steps per axis at which a cell is evaluated; sufficient for maps 4096 texels wide
 
 
 class Sky:
-    """An environment as a density of directions.
+    """The density of directions toward an environment.
 
-    compensated  whether BSDFs are sampled too
+    compensated  whether BSDFs are sampled too, so that the uniform part is omitted
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, emitter: Emitter, compensated: bool) -> None:
@@ -57,8 +58,11 @@ class Sky:
         return own(self.mi.Float, np.ascontiguousarray(values.ravel(), np.float32))
 
     def _luminance(self, steps: int) -> NDArray[np.float64]:
-        """Luminance of each cell, from (steps + 1)^2 points on its edges and inside: halfway between mean and maximum,
-        so that a cell that contains part of a sun is not underestimated."""
+        """The luminance of each cell, from (steps + 1)^2 points on its edges and inside.
+
+        It is halfway between the mean and the maximum, so that a cell that contains a part of the sun is not
+        underestimated.
+        """
         mi, high, wide = self.mi, steps * self.height, steps * self.width
         index = dr.arange(mi.UInt32, (high + 1) * wide)
         row = index // wide
@@ -80,13 +84,13 @@ class Sky:
         return 0.5 * (largest + total / (steps + 1) ** 2).astype(np.float64)
 
     def _toward(self, longitude: Float, cosine: Float) -> Vector:
-        """A direction from the longitude in turns and the cosine of the angle with the grid's y axis."""
+        """The direction with a given longitude, in turns, and a given cosine of the angle to the y axis of the grid."""
         sine = dr.sqrt(dr.maximum(0.0, dr.fma(-cosine, cosine, 1.0)))
         sin, cos = dr.sincos(longitude * (2.0 * dr.pi))
         return self.mi.Vector3f(sine * cos, cosine, sine * sin)
 
     def pdf(self, direction: Vector) -> Float:
-        """Density of `sample`, 1/sr."""
+        """The density with which `sample` generates a direction, 1/sr."""
         mi = self.mi
         turns = dr.atan2(direction.z, direction.x) * (0.5 * dr.inv_pi)
         turns -= dr.floor(turns)
@@ -96,7 +100,7 @@ class Sky:
         return dr.gather(mi.Float, self._density, row * self.width + column)
 
     def sample(self, it: Interaction, u: Point, active: Mask) -> tuple[Vector, Point, Float, Radiance]:
-        """(direction, a distant point in that direction, density in 1/sr, radiance from there)."""
+        """Sample a direction. Also returns a distant point in this direction, the density in 1/sr, and the radiance."""
         mi = self.mi
         row, down = self._rows.of(mi.UInt32(0), u.y)
         column, along = self._columns.of(row, u.x)
@@ -110,15 +114,15 @@ class Sky:
 
 
 class Choice:
-    """Inversion of cumulative sums, which run from 0 to 1 along each row.
+    """The inverse of cumulative sums, which increase from 0 to 1 along each row.
 
-    For long rows, [0, 1] is divided into as many equal intervals as the row has entries, and a guide table holds the
-    range of entries to search for each interval (Chen1974): one or two for a sky with a sun, where bisection of the row
-    needs nine steps.
+    For long rows, [0, 1] is divided into as many equal intervals as the row has entries. For each interval, a guide
+    table contains the range of entries to search (Chen1974). For a sky with a sun, the search then takes one or two
+    steps, whereas bisection of the row takes nine.
     """
 
     def __init__(self, mi: ModuleType, sums: NDArray[np.float64]) -> None:
-        rows, self.count = sums.shape  # count is a power of two
+        rows, self.count = sums.shape  # the count is a power of two
         self.mi, sums = mi, sums.astype(np.float32)
         self.sums = own(mi.Float, sums.ravel())
         self.below: UInt | None = None
@@ -129,7 +133,7 @@ class Choice:
             self.below = own(mi.UInt32, np.minimum(below, self.count - 1).astype(np.uint32).ravel())
 
     def of(self, row: UInt, u: Float) -> tuple[UInt, Float]:
-        """(the entry of a row that contains u in [0, 1], relative position of u within it)."""
+        """The entry of a row that contains u, in [0, 1], and the relative position of u within it."""
         mi, begin = self.mi, row * self.count
         at = self._bisect(begin, u) if self.below is None else self._search(self.below, row, begin, u)
         start = dr.select(at > 0, dr.gather(mi.Float, self.sums, begin + dr.maximum(at, 1) - 1), 0.0)

@@ -1,4 +1,4 @@
-"""Lamps as seen from a point: directions toward rectangles and balls, uniform in solid angle or area."""
+"""Sample directions from a point toward rectangular and spherical lamps, uniformly in solid angle or by area."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ import drjit as dr
 
 from ...bridge.types import Float, Mask, Point, Shape, Vector
 
-# Outside this range of solid angles (steradians) the area is sampled instead. Below: angles near pi in float32 have an
-# error of 2.4e-7, so at 1e-3 sr the sampled position is accurate to 2.4e-4 of an edge, and such distant lamps gain
-# nothing from solid angles. Above: the point is almost in the rectangle (2 pi = 6.283), where 1/z0 loses precision.
+# Outside this range of solid angles (steradians), the area is sampled instead. Below it, angles near pi have an error
+# of 2.4e-7 in float32, so at 1e-3 sr the error of the sampled position is 2.4e-4 of an edge, and for such distant
+# lamps, sampling the solid angle has no advantage. Above it, the point is almost in the rectangle (2 pi = 6.283), where
+# 1/z0 loses precision.
 SMALLEST_SOLID_ANGLE, LARGEST_SOLID_ANGLE = 1e-3, 6.22
 
-# A point counts as on a ball if it is closer to it than these fractions of the radius and of its coordinates.
+# A point counts as on a ball if its distance from the ball is less than these fractions of the radius and coordinates.
 TOUCHING, ROUNDING = 1e-4, 1e-6
 
-# Largest |cosine| between edges of a rectangle; float32 transforms of a true rectangle stay far below it.
+# Largest |cosine| between the edges of a rectangle; it is far larger than the errors of float32 transformations.
 STRAIGHT = 1e-4
 
 Sample = tuple[Point, Vector, tuple[Float, Float], Float]  # point, normal, (u, v), density in 1/sr
@@ -25,8 +26,10 @@ Sample = tuple[Point, Vector, tuple[Float, Float], Float]  # point, normal, (u, 
 
 @dataclass
 class Rectangle:
-    """A rectangle in space: corner, two perpendicular unit axes, their lengths, and the side of its normal: 1 for
-    axis0 x axis1, else -1."""
+    """A rectangle in space: a corner, two perpendicular unit axes, lengths of the edges, and side of the normal.
+
+    The side is 1 if the normal is axis0 x axis1, and -1 if it is the opposite.
+    """
 
     corner: Point
     axis0: Vector
@@ -37,8 +40,10 @@ class Rectangle:
 
     @staticmethod
     def of(mi: ModuleType, shape: Shape) -> Rectangle:
-        """The rectangle of a Mitsuba `rectangle` as kernel data, so that moving it recompiles nothing; the side of its
-        normal is not determined."""
+        """The rectangle of a Mitsuba `rectangle`, without the side of the normal.
+
+        It is kernel data, so moving the rectangle does not recompile kernels.
+        """
         zero, one = mi.Float(0), mi.Float(1)
         corner = shape.sample_position(zero, mi.Point2f(zero, zero)).p
         edge0 = shape.sample_position(zero, mi.Point2f(one, zero)).p - corner
@@ -55,15 +60,17 @@ class Rectangle:
         return self.length0 * self.length1
 
     def pdf(self, solid_angle: Float, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) toward a point at `distance`, where |cos| is `cosine`: uniform in the solid angle, or uniform
-        by area if `solid_angle` is 0."""
+        """The density (1/sr) toward a point at `distance`, where |cos| is `cosine`.
+
+        It is uniform in solid angle, or uniform by area if `solid_angle` is 0.
+        """
         return dr.select(solid_angle > 0, dr.rcp(solid_angle), self.pdf_by_area(distance, cosine))
 
     def pdf_by_area(self, distance: Float, cosine: Float) -> Float:
-        return dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # large at grazing angles, not inf
+        return dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # large but finite at grazing angles
 
     def hit(self, origin: Point, direction: Vector) -> tuple[Float, tuple[Float, Float], Mask]:
-        """Intersection with a ray: (distance, (u, v) in [0, 1]^2, whether there is one)."""
+        """The intersection with a ray: its distance, (u, v) in [0, 1]^2, and whether there is an intersection."""
         normal = self.normal
         distance = dr.dot(self.corner - origin, normal) / dr.dot(direction, normal)
         offset = dr.fma(direction, distance, origin) - self.corner
@@ -72,14 +79,16 @@ class Rectangle:
 
 
 class SphericalRectangle:
-    """A rectangle as seen from a point: its solid angle, and directions uniform in it.
+    """A rectangle as seen from a point: its solid angle, and uniform sampling of directions in it.
 
-    Urena2013, sec. 3: in the frame of the rectangle, with the point at the origin and the rectangle at z0 < 0, the
-    u-coordinate follows from inverting the solid angle of a sub-rectangle, the v-coordinate from inverting the height
-    on the sphere. If the solid angle is too small or too large for float32, the area is sampled instead.
+    The method is that of Urena2013, sec. 3. In the frame of the rectangle, with the point at the origin and the
+    rectangle at z0 < 0, the u-coordinate is found by inverting the solid angle of a sub-rectangle, and the v-coordinate
+    by inverting the height on the sphere. If the solid angle is too small or too large for float32, the area is sampled
+    instead.
 
-    `solid_angle` is accurate for small values too: twice the sum of the half angles of two triangles (Van Oosterom and
-    Strackee 1983), whose numerator is a product without cancellation, unlike the sum of four angles minus 2 pi.
+    `solid_angle` is accurate for small values too. It is twice the sum of the half angles of two triangles (Van
+    Oosterom and Strackee 1983), whose numerators are products without cancellation, unlike the sum of four angles minus
+    2 pi.
     """
 
     def __init__(self, rectangle: Rectangle, origin: Point):
@@ -90,7 +99,7 @@ class SphericalRectangle:
         self.z0 = -dr.abs(dr.dot(offset, rectangle.normal))
         zz = dr.square(self.z0)
         xx0, xx1, yy0, yy1 = dr.square(self.x0), dr.square(self.x1), dr.square(self.y0), dr.square(self.y1)
-        # z components of the normals of the planes through the origin and an edge: v = y0, y1 and u = x0
+        # z components of the normals of the planes through the origin and the edges v = y0, v = y1 and u = x0
         self.n0 = -self.y0 * dr.rsqrt(yy0 + zz)
         self.n2 = self.y1 * dr.rsqrt(yy1 + zz)
         n3 = -self.x0 * dr.rsqrt(xx0 + zz)
@@ -102,14 +111,15 @@ class SphericalRectangle:
         r00, r10 = dr.sqrt(xx0 + yy0 + zz), dr.sqrt(xx1 + yy0 + zz)
         r01, r11 = dr.sqrt(xx0 + yy1 + zz), dr.sqrt(xx1 + yy1 + zz)
         volume = -self.z0 * self.rectangle.area
-        # dot products of corner vectors: along an edge, and across the diagonal 10-01, which both triangles share
+        # dot products of corner vectors: along an edge, and across the diagonal 10-01, which the two triangles share
         across = self.x0 * self.x1 + self.y0 * self.y1 + zz
         along_x0, along_x1 = self.x0 * self.x1 + yy0 + zz, self.x0 * self.x1 + yy1 + zz
         along_y0, along_y1 = xx0 + self.y0 * self.y1 + zz, xx1 + self.y0 * self.y1 + zz
         lower = r00 * r10 * r01 + along_x0 * r01 + along_y0 * r10 + across * r00
         upper = r11 * r10 * r01 + along_x1 * r10 + along_y1 * r01 + across * r11
-        # The two half angles are the arguments of complex numbers, whose product adds them: (lower + i volume)
-        # (upper + i volume) needs one atan2, not two. Their sum is at most pi, inside atan2's branch.
+        # The half angles are the arguments of two complex numbers, (lower + i volume) and (upper + i volume). The
+        # argument of their product is the sum, so one atan2 suffices. The sum is at most pi, which is in the range of
+        # atan2.
         return 2 * dr.atan2(volume * (lower + upper), lower * upper - dr.square(volume))
 
     def pdf(self, distance: Float, cosine: Float) -> Float:
@@ -141,7 +151,7 @@ class SphericalRectangle:
 
 @dataclass
 class RectangularArea:
-    """A rectangle whose points are sampled uniformly by area."""
+    """A rectangle as seen from a point, whose points are sampled uniformly by area."""
 
     rectangle: Rectangle
     origin: Point
@@ -162,8 +172,7 @@ class RectangularArea:
 
 @dataclass
 class Ball:
-    """A sphere in space: its center, its radius, the side of its normal (1 outward, -1 inward), and, if needed, the
-    axes of its (u, v)."""
+    """A sphere in space: center, radius, side of the normal (1 outward, -1 inward), and axes of (u, v) if needed."""
 
     center: Point
     radius: Float
@@ -172,7 +181,7 @@ class Ball:
 
     @staticmethod
     def of(mi: ModuleType, shape: Shape) -> Ball:
-        """The ball of a Mitsuba `sphere` as kernel data, so that moving it recompiles nothing."""
+        """The ball of a Mitsuba `sphere`. It is kernel data, so moving the sphere does not recompile kernels."""
         zero, half, one = mi.Float(0), mi.Float(0.5), mi.Float(1)
         top, bottom = (shape.sample_position(zero, mi.Point2f(zero, v)).p for v in (zero, one))
         side = mi.Float(-1 if shape.has_flipped_normals() else 1)
@@ -182,7 +191,7 @@ class Ball:
         return Ball(center, radius, side, (x / radius, y / radius, (top - center) / radius))
 
     def uv(self, outward: Vector) -> tuple[Float, Float]:
-        """(u, v) of the point with normal `outward`, as in ray intersections; (0, 0) for a ball without axes."""
+        """(u, v) of the point with the outward normal `outward`, as in ray intersections; (0, 0) without axes."""
         if not self.axes:
             return type(self.radius)(0), type(self.radius)(0)
         x, y, z = (dr.dot(outward, axis) for axis in self.axes)
@@ -191,12 +200,12 @@ class Ball:
 
 
 class SphericalCap:
-    """A ball as seen from a point: the cap of directions that it subtends, and directions uniform in the cap.
+    """A ball as seen from a point: the cone of directions that it subtends, and uniform sampling of these directions.
 
-    A point of the ball follows from its direction by the law of sines (PBRT4, sec. 6.2.4), which has no cancellation.
-    For origins on the surface and inside, points are uniform by area: a diffuse inner side then samples the same light
-    from every point. The outer side cannot illuminate itself; a cap would give it a distance of 0, in a direction that
-    consists of rounding errors.
+    A point of the ball is computed from its direction by the law of sines (PBRT4, sec. 6.2.4), without cancellation.
+    For origins on the surface and inside, points are sampled uniformly by area, so that all samples have the same
+    weight on a diffuse inner side. The outer side cannot illuminate itself; sampling the cone would give a distance of
+    0, and a direction dominated by rounding errors.
     """
 
     def __init__(self, mi: ModuleType, ball: Ball, origin: Point):
@@ -208,11 +217,11 @@ class SphericalCap:
         self.outside = distance - ball.radius > TOUCHING * ball.radius + ROUNDING * reach
         self.distance = dr.select(self.outside, distance, 2 * ball.radius)
         sine2 = dr.square(ball.radius / self.distance)
-        self.height = sine2 / (1 + dr.sqrt(1 - sine2))  # 1 - cosine of the cap's half angle
+        self.height = sine2 / (1 + dr.sqrt(1 - sine2))  # 1 - cosine of the half angle of the cone
 
     @property
     def solid_angle(self) -> Float:
-        """Solid angle (sr) of a ball seen from outside."""
+        """The solid angle (sr) of the ball as seen from outside."""
         return 2 * dr.pi * self.height
 
     def pdf(self, distance: Float, cosine: Float) -> Float:
@@ -248,7 +257,7 @@ def is_sphere(mi: ModuleType, shape: Shape) -> bool:
 
 
 def is_rectangle(mi: ModuleType, shape: Shape) -> bool:
-    """Whether a shape is a `rectangle` whose edges are perpendicular (a sheared one is not)."""
+    """Whether a shape is a `rectangle` with perpendicular edges, that is, not sheared."""
     if shape is None or shape.shape_type() != mi.ShapeType.Rectangle.value:
         return False
     rectangle = Rectangle.of(mi, shape)

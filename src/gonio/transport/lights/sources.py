@@ -1,11 +1,11 @@
 """Emission of particles from the lamps.
 
-A particle is a ray from a lamp with the flux that it carries: radiance divided by `density`. That density is with
-respect to *étendue*, 1/(m^2 sr), which includes the cosine at the lamp: étendue is conserved at mirrors and, up to the
-square of the index, in glass, so the same number gives the density of particles on a surface behind them
-(`caustics.py`).
+A particle is a ray from a lamp with a flux, which is the radiance divided by `density`. This density is with respect to
+*étendue*, 1/(m^2 sr), which includes the cosine at the lamp. Étendue is conserved by mirrors and, except for the
+squared index of refraction, by glass. The same number therefore gives the density of particles on a surface that they
+reach through mirrors and glass (`caustics.py`).
 
-With `Targets`, particles are emitted only toward bounding spheres of certain shapes.
+With `Targets`, particles are emitted only toward the bounding spheres of certain shapes.
 """
 
 from __future__ import annotations
@@ -37,23 +37,24 @@ from .lights import Lights
 from .solid_angles import is_sphere
 
 SURFACE, POINT, INFINITE = 0, 1, 2
-DELTA_DENSITY = 1e30  # density of delta lamps: larger than that of any other lamp, small enough to compute with
-MAX_TARGETS = 8  # spheres that particles are aimed at; the kernel contains code for each
+DELTA_DENSITY = 1e30  # density of delta lights: larger than that of any other lamp, but small enough for computations
+MAX_TARGETS = 8  # maximum number of spheres toward which particles are emitted; the kernel contains code for each
 
 
 @dataclass
 class Particle:
-    """A particle as it leaves a lamp.
+    """A particle when it leaves a lamp.
 
-    origin     start of the ray; for a lamp at infinity, a position outside the scene
+    origin     origin of the ray; for a lamp at infinity, a position outside the scene
     direction  direction of the ray
     emitter    the lamp
-    place      for a lamp with a surface, the point on it
+    place      the point on the lamp, if it has a surface
     kind       SURFACE, POINT or INFINITE
     flux       radiance divided by density; for a point light or a parallel beam, the limit of this quotient
-    density    with respect to étendue, 1/(m^2 sr); DELTA_DENSITY for points and beams, which no other ray can hit
-    direct_weight  weight of the lamp for a camera that sees it directly: for a surface, 1 / (density by area); for a
-                   lamp at infinity, radiance divided by density by solid angle
+    density    density with respect to étendue, 1/(m^2 sr); DELTA_DENSITY for point lights and beams, which no other ray
+               can hit
+    direct_weight  weight of the lamp for a camera that sees it directly: for a surface, 1 divided by the density by
+                   area; for a lamp at infinity, radiance divided by the density by solid angle
     """
 
     origin: Point
@@ -67,7 +68,7 @@ class Particle:
 
 
 class Targets:
-    """Bounding spheres of shapes, at most MAX_TARGETS: neighboring shapes share one."""
+    """The bounding spheres of shapes. There are at most MAX_TARGETS, so neighboring shapes may share a sphere."""
 
     def __init__(self, mi: ModuleType, shapes: Sequence[Shape]):
         self.mi = mi
@@ -78,7 +79,7 @@ class Targets:
         dr.make_opaque(self.center, self.radius)
 
     def _chosen(self, pick: Float) -> tuple[Point, Float, Float]:
-        """(center, radius, rescaled random number) of a randomly selected sphere."""
+        """The center and radius of a randomly selected sphere, and the random number rescaled for reuse."""
         mi = self.mi
         number = dr.minimum(mi.UInt32(pick * self.count), self.count - 1)
         center, radius = self.center[0], self.radius[0]
@@ -88,7 +89,10 @@ class Targets:
         return center, radius, pick * self.count - mi.Float(number)
 
     def _cone(self, origin: Point, center: Point, radius: Float) -> tuple[Vector, Float, Float]:
-        """(axis, 1 - cosine of its half angle, solid angle) of a sphere's cone; from inside, the full sphere."""
+        """The cone of directions toward a sphere: its axis, 1 - cosine of its half angle, and its solid angle.
+
+        If the origin is inside the sphere, the cone contains all directions.
+        """
         away = center - origin
         distance2 = dr.squared_norm(away)
         sine2 = dr.square(radius) / dr.maximum(distance2, 1e-30)
@@ -97,7 +101,7 @@ class Targets:
         return axis, height, 2 * dr.pi * height
 
     def direction(self, origin: Point, pick: Float, u: Point) -> Vector:
-        """A direction toward one of the spheres, uniform in its cone."""
+        """Sample a direction toward one of the spheres, uniformly in the cone of this sphere."""
         center, radius, _ = self._chosen(pick)
         axis, height, _ = self._cone(origin, center, radius)
         low = height * u.x
@@ -106,22 +110,25 @@ class Targets:
         return self.mi.Vector3f(self.mi.Frame3f(axis).to_world(self.mi.Vector3f(c * sine, s * sine, 1 - low)))
 
     def direction_pdf(self, origin: Point, direction: Vector) -> Float:
-        """Density of `direction`, 1/sr."""
+        """The density with which `direction` generates a direction, 1/sr."""
         total = self.mi.Float(0)
         for center, radius in zip(self.center, self.radius, strict=True):
             axis, height, solid_angle = self._cone(origin, center, radius)
-            # 1 - cosine from the chord, which is accurate for narrow cones; the cone is enlarged for rounding errors
+            # 1 - cosine is computed from the chord, for accuracy in narrow cones, which are enlarged by rounding errors
             inside = dr.squared_norm(direction - axis) * 0.5 <= height * 1.0001
             total += dr.select(inside, dr.rcp(solid_angle), 0)
         return total / self.count
 
     def line(self, direction: Vector, pick: Float, u: Point) -> Point:
-        """A point on a line of that direction through one of the spheres, uniform on the sphere's disk."""
+        """Sample a line of a given direction through one of the spheres, uniformly over the disk of the sphere.
+
+        Returns a point on the line.
+        """
         center, radius, _ = self._chosen(pick)
         return center + self.mi.Frame3f(direction).to_world(_on_disk(self.mi, u) * radius)
 
     def line_pdf(self, point: Point, direction: Vector) -> Float:
-        """Density of `line`, 1/m^2 perpendicular to the direction."""
+        """The density with which `line` generates a line through a point, 1/m^2, perpendicular to the direction."""
         total = self.mi.Float(0)
         for center, radius in zip(self.center, self.radius, strict=True):
             offset = point - center
@@ -131,8 +138,9 @@ class Targets:
 
 
 class Sources:
-    """The lamps of a scene as emitters of particles: toward `targets`, or in all directions if that is None.
+    """The lamps of a scene as sources of particles.
 
+    targets  the spheres toward which particles are emitted; None for all directions
     Raises InputError for lamps that cannot emit particles.
     """
 
@@ -154,14 +162,14 @@ class Sources:
         dr.make_opaque(self.center, self.radius, self.kind_of, self.two_sided, self.parallel)
 
     def wavelengths(self, u: Float) -> tuple[Sequence[Float], Radiance]:
-        """Wavelengths of a particle, sampled like the camera's, and their weight; none in RGB."""
+        """Sample the wavelengths of a particle, in the same way as the camera does, and their weight; none in RGB."""
         mi = self.mi
         if not mi.is_spectral:
             return [], mi.Spectrum(1)
         return self.sensor.sample_wavelengths(dr.zeros(mi.SurfaceInteraction3f), u)
 
     def sample(self, pick: Float, place: Point, aim: Float, way: Point, wavelengths: Sequence[Float]) -> Particle:
-        """A particle; `pick` selects the lamp, `place` the point on it, `aim` and `way` the direction."""
+        """Sample a particle: `pick` selects the lamp, `place` the point on the lamp, `aim` and `way` the direction."""
         mi, lights = self.mi, self.lights
         if lights.count == 1:
             number, probability, emitter = mi.UInt32(0), mi.Float(1), mi.EmitterPtr(lights.emitters[0])
@@ -244,7 +252,7 @@ class Sources:
         pdf = self._direction_pdf(si, direction, active, two_sided)
         shines = active & (two_sided | (si.wi.z > 0)) & (pdf > 0)
         if lights.lamps.spheres is not None:
-            # Light emitted into a ball smaller than the ray's offset from the surface would start beyond its far side.
+            # In a ball smaller than the ray's offset, a ray into the ball would begin beyond the opposite side.
             radius = dr.gather(mi.Vector4f, lights.lamps.spheres, number, active).w
             inward = (radius != 0.0) & (si.wi.z * radius < 0.0)
             shines &= ~inward | (abs(radius) > lights.surfaces.offsets.at(ps.p))
@@ -256,7 +264,7 @@ class Sources:
     def _direction_pdf(
         self, si: SurfaceInteraction, direction: Vector, active: Mask, two_sided: Mask | None = None
     ) -> Float:
-        """Density of a direction away from a lamp's surface, 1/sr."""
+        """The density of a direction away from the surface of a lamp, 1/sr."""
         if self.targets is not None:
             return self.targets.direction_pdf(si.p, direction)
         assert two_sided is not None
@@ -282,7 +290,7 @@ class Sources:
             pdf = self.targets.direction_pdf(origin, direction)
         else:
             direction, pdf = mi.warp.square_to_uniform_sphere(way), mi.Float(dr.inv_four_pi)
-        it.p = origin + direction  # at unit distance, flux per area is flux per solid angle
+        it.p = origin + direction  # at unit distance, flux per area equals flux per solid angle
         _, intensity = emitter.sample_direction(it, place, active)
         flux = dr.select(active & (pdf > 0), intensity / pdf, 0)
         nowhere, density = self._nowhere(wavelengths), mi.Float(DELTA_DENSITY)
@@ -346,13 +354,13 @@ def _kind(mi: ModuleType, emitter: Emitter) -> int:
 
 
 def _on_disk(mi: ModuleType, u: Point) -> Vector:
-    """A point of the unit disk perpendicular to z."""
+    """Sample a point of the unit disk perpendicular to z."""
     on_disk = mi.warp.square_to_uniform_disk_concentric(u)
     return mi.Vector3f(on_disk.x, on_disk.y, 0)
 
 
 def _sphere_around(mi: ModuleType, shape: Shape) -> NDArray[np.float64]:
-    """Center and radius of a bounding sphere of a shape."""
+    """The center and radius of a bounding sphere of a shape."""
     box = shape.bbox()
     low, high = np.array(box.min, float).ravel(), np.array(box.max, float).ravel()
     radius = float(np.max(high - low)) / 2 if is_sphere(mi, shape) else float(np.linalg.norm(high - low)) / 2
@@ -360,8 +368,10 @@ def _sphere_around(mi: ModuleType, shape: Shape) -> NDArray[np.float64]:
 
 
 def _together(spheres: list[NDArray[np.float64]], most: int) -> list[NDArray[np.float64]]:
-    """At most `most` spheres that contain all of these; the group with the largest extent of centers is halved
-    repeatedly."""
+    """At most `most` spheres that contain all given spheres.
+
+    The spheres are divided into groups, by repeatedly halving the group whose centers have the largest extent.
+    """
     groups = [np.array(spheres)]
     while len(groups) < most:
         spans = [float(np.max(np.ptp(group[:, :3], axis=0))) if len(group) > 1 else -1.0 for group in groups]
@@ -374,7 +384,7 @@ def _together(spheres: list[NDArray[np.float64]], most: int) -> list[NDArray[np.
 
 
 def _bounding_sphere(group: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Center and radius of a sphere that contains the spheres of a group."""
+    """The center and radius of a sphere that contains all spheres of a group."""
     if len(group) == 1:
         return group[0]
     low, high = (group[:, :3] - group[:, 3:]).min(0), (group[:, :3] + group[:, 3:]).max(0)

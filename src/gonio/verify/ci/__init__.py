@@ -2,5 +2,5 @@
 
     gonio verify glass.py:Glass --junit laws.xml --sarif laws.sarif --baseline laws.json
 
-Each format has its own file, which turns a report into text; `outputs` writes it.
+Each format has its own module, which converts a report to text; `outputs` writes the files.
 """

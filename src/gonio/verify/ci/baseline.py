@@ -1,7 +1,8 @@
-"""A baseline: the known failures. Only new ones fail a report.
+"""A baseline: a list of known failures. Only new failures fail a report.
 
-A failure is known if the same law of the same card failed when the baseline was written, and its value is now at most a
-tenth worse. Any report.json can serve as a baseline; `text` writes the short form, to be stored with the code.
+A failure is known if the same law on the same card failed when the baseline was written, and its value has grown by at
+most a tenth since then. Any report.json can serve as a baseline. `text` writes a short form, to be stored with the
+code.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from ..report import Report
 from ..verdict import FAIL, KNOWN, TOLERATED, Verdict
 
 SCHEMA = "gonio-baseline/1"
-WORSE = 1.1  # ratio of values beyond which a failure is new: rounding and other machines change less
+WORSE = 1.1  # ratio of values above which a failure is new: rounding and other machines change values by less
 
 Known = Mapping[tuple[str, str], float | None]
 

@@ -1,4 +1,4 @@
-"""Annotations for GitHub Actions, which are lines that the runner reads and displays next to the code."""
+"""Annotations for GitHub Actions: lines that the runner reads and displays next to the code."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def wanted() -> bool:
 
 
 def text(report: Report) -> str:
-    """One line per law that is violated or was not tested, with the file if there is one; "" if all laws hold."""
+    """One line per law that is violated or was not tested, with the file, if any; "" if all laws hold."""
     lines = []
     for one in report.unread:
         place = places.of_unread(one)
@@ -44,7 +44,7 @@ def _line(kind: str, options: Mapping[str, str], words: str) -> str:
 
 
 def _data(text: str) -> str:
-    """The text as one line, escaped as by the runner's own toolkit, with % escaped first."""
+    """The text as one line, escaped in the same way as by the runner's own toolkit: % is escaped first."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 

@@ -1,4 +1,4 @@
-"""JUnit's XML, which Jenkins, GitLab, Azure and others display: one suite per card, one case per law."""
+"""JUnit XML, which Jenkins, GitLab, Azure and others display: one suite per card, one case per law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The files that a trial writes, and the baseline with which it is compared."""
+"""The files that a run writes, and the baseline with which its report is compared."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Outputs:
     report          folder for report.html and report.json
     junit, sarif    files in these formats
     baseline        file of known failures, which may be a report.json
-    write_baseline  file for the present failures, for use as a baseline
+    write_baseline  file for the current failures, for later use as a baseline
     tolerate        the severest grade that does not fail a report: "invisible", "small" or "visible"; "" for none
     """
 

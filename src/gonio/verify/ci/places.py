@@ -1,4 +1,4 @@
-"""The place of a verdict in a source file, its level, and its texts, for all formats."""
+"""The place of a verdict in a source file, its level and its texts, as used by all formats."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ class Place(NamedTuple):
 
 
 def of(card: Card, verdict: Verdict | None = None) -> Place | None:
-    """The line that the reasons of a verdict name, else the first line of the class; None if no file is tested."""
+    """The line stated in the reasons of a verdict or, if there is none, the first line of the class; None if the target
+    is not in a file."""
     named = _CLASS.search(card.subject.target) or next(filter(None, map(_CLASS.search, _settings(card))), None)
     if named is None:
         file = Path(card.subject.target)
@@ -44,7 +45,7 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
 
 
 def of_unread(unread: Unread) -> Place | None:
-    """The line that an error names, else the first line of the shader's file."""
+    """The line stated in an error or, if there is none, the first line of the shader's file."""
     file = shaders.file_in(unread.target)
     if file is None:
         return None
@@ -53,8 +54,8 @@ def of_unread(unread: Unread) -> Place | None:
 
 
 def level(verdict: Verdict) -> str:
-    """ "error" for a failure, "warning" if no picture shows it, "note" if declared, known or not
-    tried, else "none"."""
+    """ "error" for a failure, "warning" for a failure that is not visible in pictures, "note" for a declared or known
+    violation or a law that was not tried; otherwise "none"."""
     if verdict.status == FAIL:
         return "warning" if grade(verdict) in _SLIGHT else "error"
     return "note" if verdict.excused or verdict.status in (DECLARED, NOT_TRIED) else "none"
@@ -71,7 +72,7 @@ def cause(verdict: Verdict) -> str:
 
 
 def words(verdict: Verdict) -> list[str]:
-    """The failure, its meaning and the command that repeats it, one line each."""
+    """The failure, its consequence, and the command that repeats the test, one line each."""
     lines = list(verdict.why) or ([verdict.notes[0]] if verdict.notes else [])
     for name, text in (
         ("probable cause", cause(verdict)),
@@ -90,8 +91,8 @@ def _settings(card: Card) -> list[str]:
 
 
 def _relative(file: Path) -> str:
-    """The path relative to the root of the repository, which CI defines, or else to the current folder; the absolute
-    path for files outside."""
+    """The path relative to the root of the repository, if CI defines it, or to the current folder; the absolute path
+    for files outside of both."""
     path = file.absolute()
     root = Path(os.environ.get("GITHUB_WORKSPACE") or Path.cwd())
     for base in (root, Path.cwd()):

@@ -1,8 +1,8 @@
 """The probable cause of a failure, which is stated only if the ratio of two values fits a formula.
 
 Two values that should be equal have a ratio of 1. A missing Jacobian, cosine or pi appears in this ratio. The cause is
-the first factor that fits, of those ordered by simplicity; if the ratio is 1 except in a region, on a side of the
-surface or in a channel, the cause names that region.
+the simplest factor that fits. If the ratio is 1 except in a region, on one side of the surface or in a channel, the
+cause states that region.
 
     cause = named(Ratio("weight x pdf", "eval", wo, wi, top, bottom, subject))
 """
@@ -61,7 +61,7 @@ def named(ratio: Ratio) -> Cause | None:
 def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
     """A cause if one of the two values is constant, at the end of its range, wherever they differ."""
     if not 0.003 < bad.mean() < 0.97 or bad.sum() < FEWEST or np.ptp(ratio.wi[bad], axis=0).max() < 0.1:
-        return None  # for a single direction, all values are equal
+        return None  # all values are equal for a single direction
     sides = (ratio.above, ratio.below, ratio.top, ratio.bottom), (ratio.below, ratio.above, ratio.bottom, ratio.top)
     for values, other, name, against in sides:
         clamped, right = values[bad].max(1), other[bad].max(1)
@@ -77,7 +77,7 @@ def _clamp(ratio: Ratio, bad: np.ndarray) -> Cause | None:
         ):
             if side.mean() > 0.99 and bound.mean() > 0.99:
                 text = f"{name} is {middle:.4g} wherever {against} is {'larger' if word == 'at most' else 'smaller'}"
-                return Cause(f"{text}: clamped to {word} {middle:.4g}?", f"{name} clamped")
+                return Cause(f"{text}; possible mistake: clamping to {word} {middle:.4g}", f"{name} clamped")
     return None
 
 
@@ -95,10 +95,10 @@ def _part(ratio: Ratio) -> Cause | None:
 
 def _cause(ratio: Ratio, fit: Fit, place: str) -> Cause:
     where = f", {place}" if place else ""
-    cover = f" over {fit.cover:.0%} of directions" if fit.cover < 0.9995 else ""
+    cover = f" for {fit.cover:.0%} of the directions" if fit.cover < 0.9995 else ""
     text = f"{ratio.name} is {fit.formula}{where}, within {max(fit.spread, 1e-9):.0e}{cover}"
     key = factor_key(fit.number) if fit.number is not None else fit.formula
-    return Cause(f"{text}: {fit.guess}?" if fit.guess else text, f"{key} {place}".strip())
+    return Cause(f"{text}; possible mistake: {fit.guess}" if fit.guess else text, f"{key} {place}".strip())
 
 
 def telling(ratio: Ratio) -> Ratio:
@@ -117,8 +117,8 @@ def telling(ratio: Ratio) -> Ratio:
 def nothing_below(
     top: str, bottom: str, wo: np.ndarray, wi: np.ndarray, above: np.ndarray, below: np.ndarray
 ) -> Cause | None:
-    """The cause if, in a region with a name, the denominator is 0 but the numerator is not, as for samples where `eval`
-    is 0.
+    """The cause if the denominator is 0 but the numerator is not, in a region with a simple description, as for samples
+    where `eval` is 0.
 
     top, bottom   names of numerator and denominator
     above, below  their values
@@ -130,7 +130,7 @@ def nothing_below(
         return None
     place = place_of(wo[lit], wi[lit], bad[lit])
     words = f"{top} is positive but {bottom} is 0 {place}"
-    return Cause(f"{words}, for {bad[lit].mean():.2g} of the directions", words) if place else None
+    return Cause(f"{words}, for a fraction of {bad[lit].mean():.2g} of the directions", words) if place else None
 
 
 def _off(ratio: Ratio) -> np.ndarray:
@@ -144,7 +144,7 @@ def _off(ratio: Ratio) -> np.ndarray:
 
 
 def _region(ratio: Ratio, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
-    """The region outside of which a ratio is 1, as text and as a mask; None if no simple region fits.
+    """The region outside which a ratio is 1, as text and as a mask; None if no simple region fits.
 
     bad  pairs for which the ratio is not 1
     """
@@ -221,8 +221,8 @@ DENSE = 0.3  # fraction of a region's pairs that must be bad
 
 
 def within(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
-    """The tightest simple region, as text, that contains all bad pairs but may contain others: opposite azimuths, or an
-    interval of an angle; "" if none is tight."""
+    """The smallest simple region, as text, that contains all bad pairs but may contain others: opposite azimuths, or an
+    interval of an angle; "" if none is small enough."""
     if bad.sum() < 4:
         return ""
     apart = np.sum(wo[:, :2] * wi[:, :2], axis=1) < 0.0

@@ -29,5 +29,6 @@ def mixed(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Cause | None:
         lit = np.isfinite(one) & np.isfinite(other) & (size > 1e-6 * np.max(size, initial=0.0, where=np.isfinite(size)))
         if lit.any() and np.mean(np.abs(one - other)[lit] > MIXED * size[lit]) > 0.05:
             words = f"the red channel of the result depends on the green and blue channels of {name}"
-            return Cause(f"{words}: a mean, a maximum or a luminance in place of the channel itself?", "channels")
+            guess = "a mean, a maximum or a luminance in place of the channel itself"
+            return Cause(f"{words}; possible mistake: {guess}", "channels")
     return None

@@ -1,4 +1,4 @@
-"""The difference between samples and pdf: its place, its size, and the factor that would remove it.
+"""The difference between samples and pdf: its location, its size, and the factor that would remove it.
 
 The samples are the reference: the cells of the chi-square test contain their counts, and the expectation by the pdf is
 multiplied by each factor of the table. The first factor that leaves no difference, in the cells of one wo and in int
@@ -74,7 +74,7 @@ def blocks(cells: SampleCells) -> Blocks | None:
 
 
 def crowd(subject: Subject, held: Blocks) -> str:
-    """The largest difference of one sign between samples and pdf, its place, and the light in those cells, as text."""
+    """The largest difference of one sign between samples and pdf, its location, and the light in its cells, as text."""
     expected = held.joined(held.expected)
     off = (held.observed - expected) / np.sqrt(np.maximum(expected, FULL))
     sign = 1.0 if np.sum(np.maximum(off, 0.0) ** 2) >= np.sum(np.minimum(off, 0.0) ** 2) else -1.0
@@ -117,14 +117,14 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         if formula == "1":
             before = float(np.hypot(left, np.log(scale)))
             if before < BEFORE:
-                return None  # so small that any smooth factor would fit
+                return None  # too small: any smooth factor would fit
             if abs(np.log(scale)) < 0.01:
                 continue
         if left > EFFECT or left > 0.1 * before:
             continue
         if of_wo:
             words = f"{OVER} {formula} times a factor that depends only on wo, within {max(left, 1e-3):.0e}"
-            return Cause(f"{words}: {guess}?", f"samples {guess}")
+            return Cause(f"{words}; possible mistake: {guess}", f"samples {guess}")
         text = written(scale, KNOWN)
         text = text if text in NUMBERS else f"{scale:.3g}"
         plain = abs(scale - 1.0) < 0.01
@@ -139,22 +139,22 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
         if text.startswith("1 / ") and formula.startswith("1 / "):
             result = f"1 / ({text[4:]} {formula[4:]})"
         agree = f"{OVER} {result}, within {max(left, 1e-3):.0e}, in the cells and in the integral of the pdf for all wo"
-        return Cause(f"{agree}: {guess}?", f"samples {result}")
+        return Cause(f"{agree}; possible mistake: {guess}", f"samples {result}")
     return _sides(held)
 
 
 def _number_of_wo(subject: Subject, held: Blocks, scale: float) -> Cause:
     """The probable cause if samples follow the distribution of the pdf, but their number differs from the expectation
     by a factor that depends on wo."""
-    agree = f"{OVER} {scale:.3g} for all wi, but differs for other wo"
+    agree = f"{OVER} {scale:.3g} for all wi, but has another value for other wo"
     u = directions.numbers(np.random.default_rng(46), DRAWN)
     s = subject.sample(np.broadcast_to(held.wo, (DRAWN, 3)), u)
     failed, lacking = float(np.mean(~(s.pdf > 0.0))), 1.0 - float(held.expected.sum()) / held.drawn
     if failed > max(lacking, 0.0) + LOST and not s.delta.any():
         share = f"{failed:.0%} of the samples fail, but the integral of the pdf is only {max(lacking, 0.0):.0%} below 1"
         guess = "are normals that face away from wo sampled, or directions below the horizon"
-        return Cause(f"{agree}: {share}: {guess}?", "samples that fail")
-    return Cause(f"{agree}: a wrong probability of choosing a lobe?", "samples a number of wo")
+        return Cause(f"{agree}; {share}: {guess}?", "samples that fail")
+    return Cause(f"{agree}; possible mistake: a wrong probability of choosing a lobe", "samples a number of wo")
 
 
 def _normalizes(subject: Subject, light: estimators.Estimates, field: Field, scale: float) -> bool:
@@ -185,7 +185,7 @@ def _sides(held: Blocks) -> Cause | None:
         return None
     above, below = shares
     agree = f"{OVER} {above:.3g} above the surface and {below:.3g} below it, for all wi on each side"
-    return Cause(f"{agree}: a wrong probability of reflection?", "samples choose the side")
+    return Cause(f"{agree}; possible mistake: a wrong probability of reflection", "samples choose the side")
 
 
 def effect(expected: np.ndarray, observed: np.ndarray) -> float:
@@ -234,4 +234,5 @@ def unsampled(subject: Subject) -> str:
     if excess[row] < 1e-3:
         return ""
     share = severity.percent(float(excess[row]))
-    return f"the integral of the pdf exceeds the fraction of valid samples by {share}, wo at {severity.degrees(theta)}"
+    view = f"wo at {severity.degrees(theta)}"
+    return f"the integral of the pdf exceeds the fraction of valid samples by {share} for {view}"

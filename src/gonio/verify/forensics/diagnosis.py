@@ -1,6 +1,6 @@
 """The explanation of failures: their effect on a picture, their probable cause, and their dependence on one another.
 
-It runs after all laws, and only for those that fail, so a report without failures costs nothing extra.
+Failures are explained after all laws have been tested. A report without failures takes no additional time.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from .ratio import Cause, Ratio
 if TYPE_CHECKING:
     from ..severity import Bias
 
-# These come first: a NaN affects every measured value, and weights affect those of pdf and energy.
+# These come first: a NaN affects every measured value, and weights affect the values of pdf and energy.
 ORDER = ("positivity", "calls", "delta", "weight", "pdf", "reciprocity", "energy")
 AFTER = ("isotropy", "linearity", "precision", "gradients")
-# Failures that follow from others: quadrature and sampling of the energy disagree where weights are wrong.
+# Failures that follow from others: for example, quadrature and sampling disagree on the energy where weights are wrong.
 FOLLOWS = {"energy": ("calls", "delta", "weight", "pdf"), "pdf": ("calls", "weight")}
-LIMIT = 60.0  # seconds per law; the explanation takes less than one unless the BSDF loops
+LIMIT = 60.0  # seconds per law; the explanation takes less than one second unless the BSDF loops
 
 
 class Answer(NamedTuple):
@@ -99,18 +99,18 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
 
 
 def in_order(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """The failures among verdicts, ordered so that those from which others follow come first."""
+    """The failed verdicts, ordered so that those from which others follow come first."""
     rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     failed = [verdict for verdict in verdicts if verdict.failed]
     return sorted(failed, key=lambda v: (v.cause.startswith("follows"), rank.get(v.law, len(rank))))
 
 
-# An error in a BSDF that already failed a law must not lose the report.
+# The report must not be lost because of an error in a BSDF that has already failed a law.
 _ERRORS = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexError, KeyError, MemoryError)
 
 
 UNSTEADY = Cause(
-    "results change if a call is repeated or if other rays are added: state, random values, or a sum over all rays?",
+    "results change if a call is repeated or other rays are added: is there state, a random value or a sum over rays?",
     "unsteady",
 )
 
@@ -141,7 +141,7 @@ def _cause(law: Law, subject: Subject, finding: Finding, effort: Effort, seed: i
 
 
 def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verdict]) -> tuple[Grade, str] | None:
-    """The grade and the reason if a material, or an inner one, violates a law by nature; None if not."""
+    """The grade and the reason if a material inherently violates a law, or an inner material violates it; else None."""
     reason = subject.by_nature.get(law.name)
     if reason:
         return Grade.BY_NATURE, reason
@@ -158,5 +158,5 @@ def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verd
     return (
         Grade.INNER,
         f"{' and '.join(dict.fromkeys(wrong))} violates this law by itself; with a correct material in its place, "
-        "it holds",
+        "the law holds",
     )

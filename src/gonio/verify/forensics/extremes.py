@@ -11,8 +11,8 @@ from ...errors import InputError
 from ..subject import Fault, Subject
 from .ratio import Cause
 
-MOST = 4  # largest number of parameters that are reset one by one to see whether they matter
-OFTEN = 0.2  # fraction of the rows with a random number that must be bad for it to be the reason
+MOST = 4  # largest number of parameters that are reset one by one to find those that matter
+OFTEN = 0.2  # smallest fraction of bad rows among those with a random number, for this number to be the reason
 STEEP = 15.0  # degrees; smaller angles count as none
 NUMBERS = ("first", "second", "third")
 
@@ -21,8 +21,8 @@ Bad = tuple[str, np.ndarray, np.ndarray | None]
 
 
 def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fails: Callable[[Subject], bool]) -> str:
-    """The changed parameters without which a fault does not occur, as text: "for tint = 0"; "" if there are none or too
-    many.
+    """The changed parameters without which a fault does not occur, as text: "only for tint = 0; ..."; "" if there are
+    none or too many.
 
     settings  parameter values at which the fault occurs
     fault     the fault: "not finite" or "negative"
@@ -47,7 +47,7 @@ def of_parameters(subject: Subject, settings: Mapping[str, Any], fault: str, fai
         (True, "negative"): "a subtracted term that is not clamped",
         (False, "negative"): "a term that exceeds its range and is not clamped",
     }[zero, fault]
-    return f"only for {' and '.join(needed)}: {guess}?"
+    return f"only for {' and '.join(needed)}; possible mistake: {guess}"
 
 
 def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cause | None:
@@ -61,8 +61,9 @@ def of_numbers(rows: Sequence[Bad], corners: Sequence[float], fault: str) -> Cau
                 if not np.any(bad & ~there) and np.sum(bad & there) > OFTEN * there.sum():
                     value = "0" if corner == 0.0 else "just below 1" if corner > 0.9 else f"{corner:g}"
                     other = "1 - " if corner > 0.9 else ""
-                    words = f"{what} is {fault} only where the {name} random number is {value}"
-                    return Cause(f"{words}: a logarithm of {other}u, or a division by {other}u?", f"{fault} at u")
+                    words = f"{what} is {fault}, but only where the {name} random number is {value}"
+                    guess = f"a logarithm of {other}u, or a division by {other}u"
+                    return Cause(f"{words}; possible mistake: {guess}", f"{fault} at u")
     return None
 
 
@@ -84,11 +85,11 @@ def of_views(what: str, wo: np.ndarray, bad: np.ndarray, fault: str, transmits: 
     if np.sum(bad & beyond) < OFTEN * beyond.sum() or (first < STEEP and side.all()):
         return None
     name = "below" if side is below else "above"
-    words = f"{what} is {fault} only for wo {name} the surface"
+    words = f"{what} is {fault}, but only for wo {name} the surface"
     if first < STEEP:
         return Cause(words, f"{fault} {name}")
-    guess = ": total internal reflection?" if transmits else ""
-    return Cause(f"{words}, at {first:.3g} degrees from the normal or more{guess}", f"{fault} {name}")
+    guess = "; possible reason: total internal reflection" if transmits else ""
+    return Cause(f"{words}, {first:.3g} degrees or more from the normal{guess}", f"{fault} {name}")
 
 
 def _written(value: Any) -> str:

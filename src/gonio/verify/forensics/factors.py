@@ -1,8 +1,8 @@
-"""The table of factors that may be missing, doubled or misplaced: products of cosines, powers of the index, widths of
-a distribution, the Fresnel term.
+"""The table of factors that may be missing, applied twice or misplaced: products of cosines, powers of the index,
+widths of a distribution, and the Fresnel term.
 
-A factor is a function of (wo, wi). `fits` looks for the factor by which the ratio of two values must be divided,
-`crowding` for that by which a pdf must be multiplied to give the density of the samples.
+A factor is a function of (wo, wi). `fits` looks for the factor by which the ratio of two values must be divided, and
+`crowding` for the factor by which a pdf must be multiplied to give the density of the samples.
 """
 
 from __future__ import annotations
@@ -45,15 +45,20 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 COSINES = {
-    "(o.m)": Cosine("the Jacobian of the half vector, 4 (o.m), missing or applied twice", lambda o, i, m: _dot(o, m)),
-    "cos_m": Cosine(
-        "the cosine of the half vector, m.z, missing from its density or applied twice", lambda o, i, m: m[:, 2]
+    "(o.m)": Cosine(
+        "the Jacobian of the half vector, 4 (o.m), is missing or applied twice", lambda o, i, m: _dot(o, m)
     ),
-    "cos_i": Cosine("the cosine of wi, missing or applied twice", lambda o, i, m: i[:, 2]),
-    "cos_o": Cosine("the cosine of wo, missing or applied twice", lambda o, i, m: o[:, 2]),
-    "sin_i": Cosine("the sine of wi, the Jacobian of spherical angles", lambda o, i, m: np.hypot(i[:, 0], i[:, 1])),
-    "sin_o": Cosine("the sine of wo", lambda o, i, m: np.hypot(o[:, 0], o[:, 1])),
-    "(i.m)": Cosine("the Jacobian of refraction", lambda o, i, m: _dot(i, m)),
+    "cos_m": Cosine(
+        "the cosine of the half vector, m.z, is missing from its density or applied twice", lambda o, i, m: m[:, 2]
+    ),
+    "cos_i": Cosine("the cosine of wi is missing or applied twice", lambda o, i, m: i[:, 2]),
+    "cos_o": Cosine("the cosine of wo is missing or applied twice", lambda o, i, m: o[:, 2]),
+    "sin_i": Cosine(
+        "the sine of wi, the Jacobian of spherical angles, is missing or applied twice",
+        lambda o, i, m: np.hypot(i[:, 0], i[:, 1]),
+    ),
+    "sin_o": Cosine("the sine of wo is missing or applied twice", lambda o, i, m: np.hypot(o[:, 0], o[:, 1])),
+    "(i.m)": Cosine("the Jacobian of refraction is wrong", lambda o, i, m: _dot(i, m)),
 }
 
 
@@ -186,22 +191,23 @@ def refractions(subject: Subject) -> Iterator[Factor]:
                     return np.asarray(np.prod(values ** np.array([*p.values()], float), axis=1) * side ** float(over))
 
                 facet = over or any("m" in name for name in powers)
-                guess = COSINES["(i.m)"].guess if facet else "the cosine of wi in place of that of wo, or vice versa"
+                other = "the cosine of wi is used in place of that of wo, or vice versa"
+                guess = COSINES["(i.m)"].guess if facet else other
                 yield Factor(product("", powers | ({"eta": over} if over else {})), guess, field)
 
 
 # --------------------------------------------------------------------------- widths
 
 POWERS = {"alpha^2": 2.0, "sqrt(alpha)": 0.5}
-WIDTH = "alpha in place of alpha^2, or vice versa"
+WIDTH = "alpha is used in place of alpha^2, or vice versa"
 
 
 def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
-    """The subject with its two widths swapped, with alpha^2 and with sqrt(alpha), each if it changes values."""
+    """The subject with its two alphas swapped, with alpha^2 and with sqrt(alpha), in each case if values may change."""
     pair = getattr(subject.model, "alpha", None)
     if isinstance(pair, tuple | list) and len(pair) == 2 and np.ndim(pair[0]) == 0 and pair[0] != pair[1]:
         exchanged = subject.replace(alpha=(pair[1], pair[0]))
-        yield "alpha_x and alpha_y exchanged", "alpha_x in place of alpha_y", exchanged
+        yield "alpha_x and alpha_y exchanged", "alpha_x is used in place of alpha_y", exchanged
     for text, power in POWERS.items():
         for name, parameter in subject.parameters.items():
             value = getattr(subject.model, name, None)
@@ -261,12 +267,12 @@ def _beckmann(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
 
 # --------------------------------------------------------------------------- Fresnel's term
 
-AT_NORMAL = "the Fresnel term at the angle to the normal instead of the half vector"
+AT_NORMAL = "the Fresnel term is evaluated at the angle to the normal instead of the half vector"
 
 
 def dielectrics(subject: Subject, antisymmetric: bool) -> Iterator[Factor]:
-    """The factors for F at the wrong cosine: the exact F of a dielectric at n.o divided by that at o.m, or at n.i, with
-    F for reflection and 1 - F for transmission."""
+    """The factors for F at the wrong cosine: the exact F of a dielectric at n.o divided by that at o.m or n.i, with F
+    for reflection and 1 - F for transmission."""
     for eta in index_below(subject):
 
         def field(o: np.ndarray, i: np.ndarray, eta: float = eta) -> np.ndarray:

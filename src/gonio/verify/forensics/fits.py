@@ -18,7 +18,7 @@ from . import factors
 from .ratio import COVER, NUMBERS, SPREAD, Fit, Ratio, holds, scalar, tolerance, written
 
 FEWEST = 64  # pairs of directions that a fit needs
-ANY = "a constant factor"  # the guess for a number without a meaning
+ANY = "a constant factor"  # the guess for a number that is not a known constant
 
 
 def fitted(ratio: Ratio) -> Fit | None:
@@ -28,12 +28,12 @@ def fitted(ratio: Ratio) -> Fit | None:
     plain = scalar(ratio)
     quality = None if plain is None else holds(ratio, plain)
     if quality is not None:
-        return None  # 1 except at a few pairs: any factor that leaves most of them unchanged would explain as much
+        return None  # 1 except for a few pairs: any factor that is 1 for the others would fit
     return next((fit for fit in (candidate(ratio) for candidate in CANDIDATES) if fit is not None), None)
 
 
 def simple(ratio: Ratio) -> Fit | None:
-    """The fit by a known number, a color or powers of cosines, which needs no other evaluations; None if none holds."""
+    """The fit by a known number, a color or powers of cosines, which need no further evaluations; None if none fits."""
     if len(ratio.wo) < FEWEST:
         return None
     fit = _constant(ratio)
@@ -62,7 +62,7 @@ def _constant(ratio: Ratio) -> Fit | None:
         return Fit("-1", "a wrong sign", *quality)
     for name, number in ratio.numbers.items():
         if abs(middle / number - 1.0) < SPREAD:
-            return Fit(f"{name} = {middle:.5g}", "the chain rule, omitted or applied twice", *quality)
+            return Fit(f"{name} = {middle:.5g}", "the chain rule is omitted or applied twice", *quality)
     text = written(middle) if middle > 0.0 else f"-{written(-middle)}"
     known = text.lstrip("-") in NUMBERS
     guess = "a constant that is missing from one of the two" if known else ANY
@@ -70,7 +70,7 @@ def _constant(ratio: Ratio) -> Fit | None:
 
 
 def _color(ratio: Ratio) -> Fit | None:
-    """The fit by one constant per channel, an albedo or a tint that one of the two values lacks."""
+    """The fit by one constant per channel: an albedo or a tint that one of the two values lacks."""
     if ratio.above.shape[1] != 3 or ratio.antisymmetric or np.any(ratio.below <= 0.0):
         return None
     r = ratio.above / ratio.below
@@ -125,7 +125,7 @@ def _powers(ratio: Ratio, r: np.ndarray, logs: np.ndarray, names: list[str], pos
     scale = float(np.median(quotient))
     plain = abs(scale - 1.0) < SPREAD
     if not plain and written(scale) not in NUMBERS:
-        return None  # a clamp leaves such a ratio, with an arbitrary constant
+        return None  # clamping gives such a ratio, with an arbitrary constant
     quality = holds(ratio, quotient / scale)
     if quality is None:
         return None
@@ -149,7 +149,7 @@ def _of_table(ratio: Ratio, table: Iterator[factors.Factor]) -> Fit | None:
 def _index(ratio: Ratio) -> Fit | None:
     if not np.any(ratio.wo[:, 2] * ratio.wi[:, 2] < 0.0):
         return None
-    guess = "the factor (eta_o / eta_i)^2 of radiance, missing, applied twice or inverted"
+    guess = "the factor (eta_o / eta_i)^2 of radiance is missing, applied twice or inverted"
     return _of_table(ratio, factors.indices(ratio.subject, (2, -2, 1, -1, 4, -4, 3, -3), guess))
 
 
@@ -215,7 +215,7 @@ def _schlick(ratio: Ratio) -> Fit | None:
     cases: list[tuple[str, str, np.ndarray, np.ndarray]] = []
     if not ratio.antisymmetric:
         # F with (1 - cos)^5 = 1 is 1: a term that one of the two lacks
-        one, guess = np.ones(len(r)), "the Fresnel term, missing from one of the two or applied twice"
+        one, guess = np.ones(len(r)), "the Fresnel term is missing from one of the two or applied twice"
         for name, x in powers.items():
             cases += [(f"F({name})", guess, x, one), (f"1 / F({name})", guess, one, x)]
     order = [("n.o", "n.i"), ("n.i", "n.o")] if ratio.antisymmetric else itertools.permutations(powers, 2)

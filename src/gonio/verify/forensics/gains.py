@@ -1,11 +1,13 @@
-"""The reason why a material reflects more light than arrives: the part that gains, and parameters that matter.
+"""The reason why a material reflects more light than arrives: the lobe that gains energy, and the relevant parameters.
 
-Without absorption, a normalized part reflects at most 1. So the albedos of the lossless variant reveal causes:
+Without absorption, the albedo of a normalized lobe is at most 1. The albedos of the lossless variant therefore reveal
+causes:
 
-    parts       with one color 1 and the others 0: the part that gains by itself, or that only the sum of parts gains
-    parameters  albedo proportional to a power of one: a normalization lacks it; or no gain at one end of its range
-    lobes       at a smooth interface: transmission and reflection whose sum is not 1
-    views       albedo 1 at the normal and a power of cos_o elsewhere: the normalization holds at the normal only
+    parts       one color 1 and the others 0: a lobe gains energy by itself, or only the sum of the lobes does
+    parameters  the albedo is proportional to a power of a parameter, which is missing from the normalization; or there
+                is no gain at one end of the range of a parameter
+    lobes       at a smooth interface, transmission and reflection do not add up to 1
+    views       the albedo is 1 at the normal and a power of cos_o elsewhere: the normalization holds only at the normal
 """
 
 from __future__ import annotations
@@ -29,14 +31,14 @@ GAIN = 5e-3
 VALUES = 5  # values of a parameter
 SPAN = 4.0  # factor by which a parameter is divided and multiplied
 POWER = 0.15  # largest difference of an exponent from an integer
-RESIDUAL = 0.05  # of a logarithm: Fresnel terms and losses at the horizon vary as well
-LEAST_AT_NORMAL = 0.8  # smallest albedo at the normal of a material that gains at grazing views only
+RESIDUAL = 0.05  # of a logarithm: Fresnel terms and losses at the horizon vary too
+LEAST_AT_NORMAL = 0.8  # smallest albedo at the normal of a material that gains energy only at grazing views
 NARROW = 0.3  # largest width at which little light is lost at the horizon
 MOST = 6  # largest number of parameters, or of colors
 
 
 def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
-    """The parts, parameters and views on which a gain depends.
+    """The lobes, parameters and views on which a gain depends.
 
     white   the subject without absorption
     albedo  function that returns the albedos of a subject
@@ -59,7 +61,7 @@ def causes(white: Subject, albedo: Albedo) -> Iterator[Cause]:
 
 
 def _parts(white: Subject, albedo: Albedo, here: float) -> str:
-    """A description of the colors whose part gains on its own; "" if there is no such part or only one color."""
+    """A description of the colors whose lobes gain energy on their own; "" if there is none or only one color."""
     colors = {
         leaf.path: leaf.parameter
         for leaf in tree.leaves(white.model)
@@ -74,16 +76,17 @@ def _parts(white: Subject, albedo: Albedo, here: float) -> str:
         if value is None:
             return ""
         by_part[path] = float(value.max())
-    # other colors scale or shift the sum: they do not belong to one part
+    # other colors scale or shift the sum, and do not belong to a single lobe
     if min(by_part.values()) < GAIN or here > sum(by_part.values()) + GAIN:
         return ""
     wrong = [path for path, value in by_part.items() if value > 1.0 + GAIN]
     text = ", ".join(f"{value:.4g} with {path} alone" for path, value in by_part.items())
     if not wrong:
         words = f"the albedo is {text}, but {here:.4g} for all together"
-        return f"{words}: is one lobe not reduced by what the other reflects?"
+        return f"{words}: is one lobe not attenuated by the reflectance of the other?"
     if len(wrong) < len(colors):
-        return f"the largest albedo is {text}: a wrong normalization of the lobe with {' and '.join(wrong)}?"
+        guess = f"a wrong normalization of the lobe with {' and '.join(wrong)}"
+        return f"the largest albedo is {text}; possible mistake: {guess}"
     return ""
 
 
@@ -160,15 +163,15 @@ def _power(white: Subject, albedo: Albedo, here: np.ndarray) -> tuple[Cause | No
             none = float(np.exp(least)) if np.isfinite(least) else low
             words = f"without absorption, the largest albedo is {largest.min():.4g} at {name} = {none:.3g} and "
             words += f"{largest.max():.4g} at {float(np.exp(x[np.argmax(largest)])):.3g}"
-            guess = f"a term that depends on {name} and is too large there: normalization, masking or compensation"
-            ends.append(Cause(f"{words}: {guess}?", f"gain by {name}"))
+            guess = f"a normalization, masking or compensation term that depends on {name} and is too large there"
+            ends.append(Cause(f"{words}; possible mistake: {guess}", f"gain by {name}"))
     if powers:
         formula = " ".join(name if power == 1.0 else f"{name}^{power:g}" for name, power in powers.items())
         constant = float(here[0].mean()) / scale
         times = "" if abs(constant - 1.0) < 2.0 * RESIDUAL else f"{written(constant, RESIDUAL)} "
         words = f"without absorption, the albedo at normal incidence is {times}{formula}"
         guess = "powers that are missing from the normalization or applied twice"
-        return Cause(f"{words}: {guess}?", f"gain {formula}"), None
+        return Cause(f"{words}; possible mistake: {guess}", f"gain {formula}"), None
     return None, ends[0] if ends else None
 
 
@@ -186,8 +189,8 @@ def _views(here: np.ndarray) -> Cause | None:
     row = int(np.argmax(a))
     words = f"without absorption, the albedo is {a[0]:.4g} at the normal and {a[row]:.4g} at {VIEWS[row]:g} degrees"
     if abs(slope) > 0.05 and np.abs(np.log(a) - (slope * np.log(mu) + start)).max() < 3.0 * RESIDUAL:
-        words += f", like cos_o^{slope:.2g}"
-    return Cause(f"{words}: {guess}?", "gain at grazing views")
+        words += f", proportional to cos_o^{slope:.2g}"
+    return Cause(f"{words}; possible mistake: {guess}", "gain at grazing views")
 
 
 # --------------------------------------------------------------------------- delta lobes
@@ -213,7 +216,7 @@ def of_lobes(subject: Subject, seed: int) -> Iterator[Cause]:
     row = int(np.argmax((R + T).max(1)))
     words = f"delta lobes reflect {R[row].max():.4g} and transmit {T[row].max():.4g} at {VIEWS[1 + row]:g} degrees"
     if np.ptp(R, axis=1).max() > EXACT and near(1.0 - R.mean(1, keepdims=True)):
-        yield Cause(f"{words}: is the transmittance 1 - the mean reflectance of the channels?", "T of mean R")
+        yield Cause(f"{words}: is the transmittance 1 minus the mean reflectance of the channels?", "T of mean R")
     elif near(1.0 - R / np.maximum(2.0 - R, 1e-6)):
         yield Cause(
             f"{words}: is the reflectance that of both faces of a pane, but the transmittance that of one?", "T of one"

@@ -1,4 +1,4 @@
-"""The reason why a white furnace loses light: parameters for whose extreme values the loss vanishes."""
+"""The reason for a loss of light in a white furnace: parameters at whose extreme values the loss vanishes."""
 
 from __future__ import annotations
 

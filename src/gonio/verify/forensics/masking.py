@@ -1,10 +1,10 @@
-"""A check of whether the Lambda of a distribution is that of its D.
+"""A check of whether the Lambda of a distribution matches its D.
 
 The facets that are visible from wo fill the projected area of the surface (Heitz2014, eq. 14), so
 
     int D(m) max(wo . m, 0) dm = (1 + Lambda(wo)) cos theta_o.
 
-A wrong Lambda satisfies every other law as long as it only reduces the light, since D and the density of normals are
+A wrong Lambda satisfies every other law as long as it only reduces the light, because D and the density of normals are
 correct.
 """
 
@@ -48,8 +48,8 @@ def mismatch(subject: Subject) -> str:
         return ""
     theta = directions.angles(wo[row])[0]
     return (
-        f"the masking does not match the distribution: 1 + Lambda is {stated[row]:.4g} at {theta:.3g} degrees, where "
-        f"the facets of D that face this direction have {area[row]:.4g} times the projected area"
+        f"the masking does not match the distribution: 1 + Lambda is {stated[row]:.4g} at {theta:.3g} degrees, but the "
+        f"facets of D that face this direction have {area[row]:.4g} times the projected area of the surface"
     )
 
 

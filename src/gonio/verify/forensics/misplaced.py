@@ -1,11 +1,11 @@
-"""The places of samples that the pdf does not predict, if no single factor of `crowding` explains them.
+"""The places of samples that the pdf does not predict, if no single factor of `crowding` explains the difference.
 
 The counts o and expectations e of blocks of cells have a ratio r = o / e. Three patterns of r are recognized:
 
-    the pdf in another frame     samples follow pdf(wo, M wi), where M is a rotation about the normal or a mirror image
-    two parts                    r is a constant c in most blocks, and elsewhere only larger than c (the pdf lacks a
-                                 lobe), or only smaller (the pdf has a lobe that is never sampled)
-    one variable                 r is a function of one angle, whose distribution differs from that in the pdf
+    the pdf in another frame     samples follow pdf(wo, M wi), where M is a rotation about the normal or a reflection
+    two parts                    r is a constant c in most blocks; in the others, it is always larger than c (the pdf
+                                 lacks a lobe), or always smaller (the pdf has a lobe that is never sampled)
+    one variable                 r is a function of one angle, whose distribution differs from that of the pdf
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ SMALL = 0.02  # smallest difference that one variable explains
 PLATEAU = 0.3  # smallest fraction of the expectation in blocks of one ratio
 LEAST = 0.02  # smallest fraction of all samples that lie elsewhere
 OTHER = 0.15  # largest fraction of these for differences of the other sign
-APART = 2.0  # ratio of samples to pdf, relative to that of most blocks, where a lobe is missing in one of them
+APART = 2.0  # ratio of samples to pdf, relative to that of most blocks, where a lobe is missing from one of the two
 BESIDE = 0.4  # smallest fraction of the difference in such blocks
 NATURAL = 0.06  # largest difference of the integral of the pdf from the fraction of the samples
 NOISE = 4.0  # standard errors
 STEP = 0.02  # difference of logarithms within which ratios count as equal
 BINS = 48
 NEAR_HORIZON, NEAR_NORMAL = 0.3, 0.95  # cosines
-FEW = 0.06  # fraction of the hemisphere below which a crowd is a ring or a point
+FEW = 0.06  # fraction of the hemisphere below which an excess of samples is a ring or a point
 
 
 def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Cause | None:
@@ -95,7 +95,7 @@ def _other_frame(subject: Subject, held: Blocks, before: float) -> Cause | None:
     wo = np.broadcast_to(held.wo, held.wi.shape)
     swapped = held.joined(np.nan_to_num(subject.pdf(held.wi, wo), posinf=0.0, neginf=0.0) * held.area) * held.drawn
     if (left := effect(swapped, held.observed)) < 3.0 * EFFECT and left < 0.3 * before:
-        words = "samples follow the pdf with wo and wi exchanged: swapped arguments?"
+        words = "samples follow the pdf with wo and wi exchanged; possible mistake: swapped arguments"
         return Cause(words, "samples of swapped directions")
     for text, guess, matrix in _frames(subject):
         for which, view in (("", wo), (", and the same for wo", wo @ matrix.T)):
@@ -103,7 +103,7 @@ def _other_frame(subject: Subject, held: Blocks, before: float) -> Cause | None:
             left = effect(held.joined(density * held.area) * held.drawn, held.observed)
             if left < 3.0 * EFFECT and left < 0.3 * before:
                 words = f"samples follow the pdf {text}{which}"
-                return Cause(f"{words}: {guess}?", "samples in another frame")
+                return Cause(f"{words}; possible mistake: {guess}", "samples in another frame")
     return None
 
 
@@ -158,10 +158,11 @@ def _parts(subject: Subject, held: Blocks) -> Cause | None:
         else:
             guess = "a lobe that is missing from the pdf"
         return Cause(
-            f"samples follow the pdf{scale}, except for {share} of them, {place}: {guess}?", "pdf lacks a lobe"
+            f"samples follow the pdf{scale}, except for {share} of them, {place}; possible mistake: {guess}",
+            "pdf lacks a lobe",
         )
-    words = f"samples follow the pdf{scale}, but {share} of it, {place}, is rarely sampled"
-    return Cause(f"{words}: a lobe that `sample` does not choose?", "sample lacks a lobe")
+    words = f"samples follow the pdf{scale}, but {share} of the pdf, {place}, is rarely sampled"
+    return Cause(f"{words}; possible mistake: a lobe that `sample` does not choose", "sample lacks a lobe")
 
 
 def _place(held: Blocks, weight: np.ndarray) -> tuple[str, bool]:
@@ -240,5 +241,5 @@ def _one_variable(cells: SampleCells, held: Blocks, before: float) -> Cause | No
     if best is None:
         return None
     _, name, guess, ratio = best
-    words = f"the ratio of samples to pdf depends on {name} alone, from {ratio.min():.2g} to {ratio.max():.2g}"
-    return Cause(f"{words}: {guess}?", f"samples by {name}")
+    words = f"the ratio of samples to pdf depends on {name} alone and is {ratio.min():.2g} to {ratio.max():.2g}"
+    return Cause(f"{words}; possible mistake: {guess}", f"samples by {name}")

@@ -1,7 +1,7 @@
-"""Lobes that a random number selects: comparison of their weights in the pdf with those of the samples.
+"""Lobes that are selected by a random number: their weights in the pdf compared with those of the samples.
 
-A sweep finds the number that selects a lobe: the sampled direction jumps at one value of this number, whatever the
-other numbers are. Samples below and above this value give histograms of two lobes, a(wi) and b(wi), and the expectation
+A sweep finds the number that selects a lobe: the sampled direction jumps at one value of this number, regardless of the
+other numbers. Samples below and above this value give histograms of two lobes, a(wi) and b(wi), and the expectation
 by the pdf in the same blocks of cells is compared with
 
     x a + y b + ...                  constant weights
@@ -67,7 +67,7 @@ def named(subject: Subject, cells: SampleCells, held: Blocks, seed: int) -> Caus
     if _effect(mean * lobes[0] + (1.0 - mean) * lobes[1], expected) < 2.0 * EFFECT:
         words = "the pdf weights the two lobes by the probability that the samples have for wo = wi"
         guess = "the probability of a lobe is evaluated at wi in the pdf, but at wo in sample"
-        return Cause(f"{words}: {guess}?", "share of wi")
+        return Cause(f"{words}; possible mistake: {guess}", "share of wi")
     return None
 
 
@@ -86,10 +86,10 @@ def _of_weights(weights: np.ndarray, shares: np.ndarray) -> Cause | None:
             return None
         number = wrong[0] + 1
         words += (
-            f": the density of lobe {number} is {written(float(ratios[wrong[0]]), 0.004)} times that of its samples"
+            f"; the density of lobe {number} is {written(float(ratios[wrong[0]]), 0.004)} times that of its samples"
         )
         return Cause(f"{words}: is its normalization or its probability missing, or squared?", "weights of lobes")
-    return Cause(f"{words}: {guess}?", "weights of lobes")
+    return Cause(f"{words}; possible mistake: {guess}", "weights of lobes")
 
 
 def _choice(subject: Subject, wo: np.ndarray, seed: int) -> tuple[int, np.ndarray] | None:

@@ -38,7 +38,7 @@ def of(material: BSDF, wo: NDArray[np.float64], wi: NDArray[np.float64]) -> str:
         for _, node in graph.flatten(recording.entry.result, "", graph.Node):
             if not _finite(called.value(node)):
                 words = called.origin(node)
-                return words + (" in 32 bits" if words and kind is np.float32 else "")
+                return words + (" in float32" if words and kind is np.float32 else "")
     return ""
 
 
@@ -74,7 +74,7 @@ class _Called:
                 self.places[node.index] = len(self.places)
                 self.values.append(arguments[self.places[node.index]])
             elif node.op == "constant":
-                # a plain number, which takes on the precision of the others
+                # a plain number, which takes the precision of the others
                 self.values.append(node.static if isinstance(node.static, bool) else float(node.static))
             elif node.op == "call":
                 one = self.inner[node.index] = _Called(node.static, given, self._argument(node))

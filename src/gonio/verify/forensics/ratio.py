@@ -1,4 +1,4 @@
-"""A ratio of two values that should be equal: `fits` finds its formula, `causes` the probable mistake."""
+"""A ratio of two values that should be equal. `fits` finds its formula, and `causes` the probable mistake."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Cause:
     """A probable cause.
 
     words   the cause as a sentence of the report
-    key     the cause without numbers; failures with the same key have the same cause
+    key     the cause without numbers: failures with the same key have the same cause
     """
 
     words: str
@@ -41,7 +41,7 @@ class Ratio:
     subject        the subject to which they belong
     recompute      function that computes `below` for another subject, other directions or the other mode
     numbers        constants, in addition to the usual ones, to which this ratio may be equal: "2 alpha"
-    zero           the mistake that a ratio of 0 suggests
+    zero           the mistake suggested by a ratio of 0
     antisymmetric  whether swapping wo and wi inverts the ratio, so that factors symmetric in the two cancel
     accuracy       relative difference of two values that count as equal; None derives it from the precision
     """
@@ -72,7 +72,8 @@ class Ratio:
 
 
 class Fit(NamedTuple):
-    """The formula of a ratio, the mistake that it suggests, and how well it holds; `number` is a constant."""
+    """The formula of a ratio, the mistake that it suggests, and its accuracy: spread and fraction of the pairs covered.
+    `number` is the formula's value if it is a constant."""
 
     formula: str
     guess: str
@@ -98,7 +99,7 @@ NUMBERS |= {"4 / pi": 4.0 / np.pi, "pi / 4": np.pi / 4.0, "2 / pi": 2.0 / np.pi,
 
 
 def written(value: float, allowed: float = SPREAD) -> str:
-    """A number as text: as a formula if it is a known number, else as digits."""
+    """A number as text: a formula if it is a known number, digits otherwise."""
     for name, known in NUMBERS.items():
         if abs(value / known - 1.0) < allowed:
             return name
@@ -106,7 +107,7 @@ def written(value: float, allowed: float = SPREAD) -> str:
 
 
 def factor_key(number: float) -> str:
-    """A common key for a factor and its inverse, since the ratio does not show which of the two values lacks it."""
+    """A common key for a factor and its inverse, because the ratio does not show which of the two values lacks it."""
     return f"factor {max(number, 1.0 / number):.3g}" if number > 0.0 else f"factor {number:.3g}"
 
 

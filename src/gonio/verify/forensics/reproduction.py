@@ -1,4 +1,4 @@
-"""A failure of a Mitsuba plugin as a short program for the plugin's authors, which requires only Mitsuba.
+"""A failure of a Mitsuba plugin as a short program for the plugin's authors, which needs only Mitsuba.
 
 As long as the defect exists, the program ends with an AssertionError that states the measured value.
 

@@ -1,8 +1,8 @@
 """Detection of a cosine that is rounded to few bits, so that values change in equal steps of it.
 
-In half precision, 1 - cos^2 has few digits if cos is close to 1, so the peak of a narrow lobe becomes a disk with
-rings. Along a line on which the cosine decreases evenly, the values of such a lobe are constant except for jumps at
-equal distances.
+In half precision, 1 - cos^2 has few correct digits if cos is close to 1, and the peak of a narrow lobe becomes a disk
+with rings. Along a line on which the cosine decreases evenly, the values of such a lobe are constant except for jumps
+at equal distances.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ RANGE = 0.02  # of the cosine, from 1 down: 11 degrees
 LEAST = 5  # smallest number of jumps
 SHARP = 30.0  # ratio of a jump to the median change from one direction to the next
 STEPPED = 0.8  # smallest fraction of the total change that occurs in jumps
-EQUAL = 0.1  # largest relative spread of their distances
+EQUAL = 0.1  # largest relative spread of the distances between jumps
 
 
 def named(subject: Subject) -> Cause | None:

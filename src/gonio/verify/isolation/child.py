@@ -1,14 +1,16 @@
-"""A trial in separate processes, which reports on a BSDF even if it loops, crashes, prints or exhausts memory.
+"""A run in separate processes, which reports on a BSDF even if it loops forever, crashes, prints or exhausts memory.
 
     trial(Task((Item("glass.py:Glass"),), "quick", seed=1), jobs=2)
 
 Each process (`worker`) tests one card at a time and announces every step and every call of the BSDF. If it crashes, or
-exceeds its time or memory, a new process tests the card again without the call that was in progress, which fails the
-laws that need it; or, if no call was in progress, without the law. The threshold of a statistical test depends on the
-number of tests in the report, which is known only after all cards. A card is therefore decided by the number of its own
-tests, and again if the final number makes a difference, so that the report does not depend on the number of processes.
+exceeds its time or memory limit, a new process tests the card again without the call that was in progress; the laws
+that need this call fail. If no call was in progress, the law is omitted. The threshold of a statistical test depends on
+the number of tests in the report, which is known only after all cards. A card is therefore evaluated with the number of
+its own tests, and again if the final number changes a verdict, so that the report does not depend on the number of
+processes.
 
-This module imports nothing of Gonio or NumPy at the top, since the first process starts before this one loads the rest.
+This module does not import NumPy or other modules of Gonio at the top, because the first process starts before this
+one loads the rest.
 """
 
 from __future__ import annotations
@@ -38,18 +40,18 @@ if TYPE_CHECKING:
 ISOLATED = "isolated"  # location of the error about a material that cannot be sent
 OTHERS = "*"  # key that stands for all parameter values except the given ones
 LOOK = 0.05  # seconds between two checks of time and memory
-STRIKES = 3  # crashes in a method after which it is called at the given values only; or of a card outside any call
+STRIKES = 3  # crashes in a method after which it is called only at the given values; also crashes outside any call
 
 Progress = Callable[[int, int, str], None]
 Tell = Callable[[str], None]
 
 
 class Item(NamedTuple):
-    """A target of a trial.
+    """A target of a run.
 
     target    its name, or a pickled material
     settings  values of its parameters, each "alpha=0.3"
-    sweep     values of the parameter that varies, as `vary` of `targets.resolve`
+    sweep     values of one parameter, in the form of `vary` of `targets.resolve`
     """
 
     target: str | bytes
@@ -63,7 +65,7 @@ class Item(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A trial.
+    """The task of a run.
 
     items   the targets
     effort  name of the effort
@@ -111,12 +113,12 @@ def trial(
 ) -> Report:
     """The report of a task.
 
-    jobs       number of simultaneous processes
+    jobs       number of processes that run at a time
     limit      seconds per law; None means GONIO_VERIFY_LIMIT or 300
     memory     GB per process; None means half of the machine's memory for all processes together
     progress   function that is called with the number of completed steps, the number of all steps, and the next step
-    tell       function that is called with the result of each law if there is a single card, else with that of each
-               card, as soon as it is known
+    tell       function that is called with the result of each law (if there are several cards, of each card) as soon as
+               the result is known
     threshold  p-value below which a test rejects, if the task is part of a larger one
     """
     if jobs < 1:
@@ -182,7 +184,7 @@ class _State:
 
 
 class _Pool:
-    """The processes of a trial, and the state of each card."""
+    """The processes of a run, and the state of each card."""
 
     def __init__(
         self, task: Task, jobs: int, limit: float, memory: float, progress: Progress | None, tell: Tell | None
@@ -315,7 +317,7 @@ class _Pool:
 
 
 def _machine_memory() -> float:
-    """The memory of this machine, or of its container, which psutil does not consider, in bytes."""
+    """The memory in bytes of this machine or of its container, whose limit psutil ignores."""
     sizes = [float(psutil.virtual_memory().total)]
     for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         with contextlib.suppress(ValueError, OSError):

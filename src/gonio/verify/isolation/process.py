@@ -1,6 +1,7 @@
-"""The parent's view of one process of a trial: its card and step, their starting time, and the call in progress.
+"""The parent's view of one process of a run: its card and step, their starting time, and the call in progress.
 
-This module imports nothing of Gonio or NumPy at the top, since the first process starts before this one loads the rest.
+This module does not import NumPy or other modules of Gonio at the top, because the first process starts before this
+one loads the rest.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ import psutil
 from . import watch
 
 STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
-GRACE = 1.0  # seconds beyond the limit: the alarm inside the process stops a loop in Python without a new process
+GRACE = 1.0  # seconds beyond the limit, in which the alarm inside the process may stop a loop in Python
 LOAD = 20.0  # smallest limit in seconds for starting and loading: Mitsuba alone may take several
 MAX_PRINTED = 256 << 20  # bytes; a process that prints more is stopped before it fills the disk
 
@@ -44,8 +45,8 @@ _ahead: list[_Started] = []
 
 @contextlib.contextmanager
 def started_ahead() -> Iterator[None]:
-    """Start the first process before its task is known: it loads while the command line is read. A process that got no
-    task ends with the block."""
+    """Start the first process before its task is known, so that it loads while the command line is parsed. A process
+    that receives no task ends with the block."""
     _ahead.append(_start())
     try:
         yield
@@ -74,7 +75,7 @@ def _start() -> _Started:
 
 
 class Process:
-    """One process of a trial: its card and step, their starting time, and the call in progress."""
+    """One process of a run: its card and step, their starting time, and the call in progress."""
 
     def __init__(self, task: object, limit: float, answers: queue.Queue[tuple[Process, Any]]) -> None:
         self.folder, self.log, self.process = _ahead.pop() if _ahead else _start()
@@ -86,7 +87,7 @@ class Process:
         threading.Thread(target=self._read, args=(answers,), daemon=True).start()
 
     def order(self, *order: object) -> None:
-        """Send an order. If the process has ended, this is detected by the end of its answers."""
+        """Send an order. If the process has ended, the end of its answers shows this."""
         assert self.process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             self.process.stdin.write(pickle.dumps(order))
@@ -120,7 +121,7 @@ class Process:
         return ""
 
     def end(self, reason: str = "") -> None:
-        """Kill the process and those that it started.
+        """Kill the process and all processes that it has started.
 
         reason  the reason, which `why` then returns
         """
@@ -133,13 +134,13 @@ class Process:
         self.process.wait()
 
     def why(self) -> str:
-        """The reason why its answers ended."""
+        """The reason why no more answers arrive."""
         try:
             code = self.process.wait(timeout=1.0)
         except psutil.TimeoutExpired:
             code = None
         if self.reason or code is None:
-            return self.reason or "it closed the pipe to the process that watches it"
+            return self.reason or "it closed the pipe to the process that monitors it"
         if code >= 0:
             return f"the process exited with code {code}"
         return f"the process crashed: {getattr(code, 'name', code)}"

@@ -1,4 +1,4 @@
-"""A time limit for the code of a BSDF, so that an endless loop does not hang the trial."""
+"""A time limit for the code of a BSDF, so that an endless loop does not stop the run."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from types import FrameType
 from typing import Any
 
 LIMIT = float(os.environ.get("GONIO_VERIFY_LIMIT", "300"))  # seconds per law; the slowest takes about ten
-GRACE = 20.0  # seconds until the process ends, since a signal does not interrupt a loop inside a kernel
-watched = False  # whether a parent watches this process, and ends it if the signal has no effect
-# context around each call of a BSDF, by model and method; a watched process announces the call there
+GRACE = 20.0  # further seconds until the process ends, because a signal does not interrupt a loop inside a kernel
+watched = False  # whether a parent monitors this process and ends it if the signal has no effect
+# context around each call of a BSDF, by model and method, in which a monitored process announces the call
 calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = None
 
 
@@ -32,7 +32,7 @@ def limited(what: str, seconds: float | None = None) -> Iterator[None]:
 
     what  name of the law, for the error
     A loop in Python is interrupted. A loop in a compiled kernel cannot be: the process then prints an error and exits
-    with code 2, unless a parent watches it (`gonio.verify.isolation.child`). The same holds outside the main thread,
+    with code 2, unless a parent monitors it (`gonio.verify.isolation.child`). The same applies outside the main thread
     and on platforms without SIGALRM.
     """
     seconds = seconds or LIMIT
@@ -63,7 +63,8 @@ def limited(what: str, seconds: float | None = None) -> Iterator[None]:
 
 
 class _Watchdog(threading.Thread):
-    """A thread that calls functions at their deadlines. One for all: to start a thread takes longer than many a law."""
+    """A thread that calls functions at their deadlines. All share one thread, because starting one takes longer than
+    testing many of the laws."""
 
     def __init__(self) -> None:
         super().__init__(name="gonio watchdog", daemon=True)

@@ -1,9 +1,9 @@
-"""The process in which a BSDF is tested, started by `child`. It may loop, crash, print, or exhaust memory.
+"""The process in which a BSDF is tested, started by `child`. It may loop forever, crash, print, or exhaust memory.
 
 Orders arrive pickled on standard input. Answers are sent pickled through a copy of standard output, and the output of
-the BSDF goes to the file that is standard error. An order is (card, skip, forbidden, threshold). Before each step, an
-answer announces it, and before each call of the BSDF, a file describes it, so that the parent knows what was in
-progress if the process ends.
+the BSDF goes to the file to which standard error is redirected. An order is (card, skip, forbidden, threshold). Each
+step is announced by an answer, and each call of the BSDF is described in a file, so that the parent can tell what was
+in progress if the process ends.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def main() -> None:
         _work(orders, say)
     except GonioError as error:
         say("error", error)
-    except (_Stuck, Fault) as error:  # here, a fault is that of a repeated test
+    except (_Stuck, Fault) as error:  # here, a fault comes from a repeated test
         say("lost", str(error))
     except (KeyboardInterrupt, SystemExit, GeneratorExit, TimeoutError, MemoryError, RecursionError) as error:
         # Ctrl-C does not reach this process: the BSDF raised it, outside the calls that `guarded` watches
@@ -60,11 +60,11 @@ def main() -> None:
             internal = GonioError(f"the verifier raised {what}", "", "run `gonio --debug ...` and report its output")
             internal.code = MachineError.code
             say("error", internal, traceback.format_exc())
-    os._exit(0)  # whatever threads and handlers the BSDF has left behind
+    os._exit(0)  # regardless of threads and handlers that the BSDF has left behind
 
 
 def _work(orders: IO[bytes], say: Say) -> None:
-    chosen(None)  # loads the laws in advance: the parent may not know its task yet
+    chosen(None)  # loads the laws in advance, while the parent may not know the task yet
     try:
         task, limit, in_progress = cast(tuple[Task, float, str], pickle.load(orders))
     except EOFError:  # the parent has none
@@ -93,7 +93,7 @@ def _work(orders: IO[bytes], say: Say) -> None:
 
 
 def _loaded(items: Sequence[Item]) -> tuple[list[Subject], list[Unread]]:
-    """The subjects of the targets, and the shaders that could not be read although other targets could."""
+    """The subjects of the targets, and the shaders that could not be read, although other targets could."""
     subjects: list[Subject] = []
     unread: list[Unread] = []
     for item in items:
@@ -115,8 +115,8 @@ def _outside(error: BaseException) -> str:
 
 
 def _pipes() -> tuple[IO[bytes], Say]:
-    """The stream of orders, and the function that sends an answer. Both are independent of what the BSDF reads and
-    prints."""
+    """The stream of orders, and the function that sends an answer. Both are separate from the input and output of the
+    BSDF."""
     orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
@@ -137,15 +137,15 @@ def _pipes() -> tuple[IO[bytes], Say]:
 
 
 class _Stuck(BaseException):
-    """A call did not end in time. No law catches this exception, since a new process starts without repeating the
-    call."""
+    """A call did not end in time. No law catches this exception, because a new process starts without repeating
+    the call."""
 
 
 class _Calls:
-    """Write each call of the BSDF to a file for the parent, and reject calls that ended an earlier process.
+    """Record each call of the BSDF in a file for the parent, and reject calls that ended an earlier process.
 
     in_progress  path of the file
-    forbidden    (method, parameter values) -> the reason why such a call must not be repeated
+    forbidden    (method, parameter values) -> the reason why this call must not be repeated
     given        key of the material's given parameter values
     """
 
@@ -168,7 +168,7 @@ class _Calls:
         try:
             yield
         except TimeoutError as error:
-            raise _Stuck(str(error)) from error  # the parent still knows the call
+            raise _Stuck(str(error)) from error  # the file still describes the call
         except BaseException as error:
             self._note()
             if isinstance(error, KeyboardInterrupt):  # raised by the BSDF: Ctrl-C does not reach this process
@@ -178,7 +178,7 @@ class _Calls:
 
     def _note(self, *call: str) -> None:
         with contextlib.suppress(Exception):  # the BSDF may have closed it
-            sys.stdout.flush()  # an abort would lose what it has buffered
+            sys.stdout.flush()  # an abort would lose buffered output
         with contextlib.suppress(OSError):
             os.lseek(self.file, 0, os.SEEK_SET)
             os.write(self.file, pickle.dumps(call))
@@ -220,7 +220,7 @@ def _subjects(item: Item) -> list[Subject]:
         return targets.resolve(item.target, item.settings, item.sweep)
     try:
         return [of(pickle.loads(item.target))]
-    except Exception as error:  # such as of a module that only the other process can import
+    except Exception as error:  # for example, if only the other process can import a module
         what = f"the material cannot be sent to another process: {error}"
         raise InputError(what, ISOLATED, "put the class into a file and name it FILE.py:CLASS") from error
 

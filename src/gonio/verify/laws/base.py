@@ -25,8 +25,8 @@ class Law:
     meaning     the effect of a violation on pictures
     everywhere  whether it is also tested at other parameter values
     at_ends     whether these values may lie at the ends of their ranges
-    samples     whether it tests `sample`; if a material needs a guide, few other parameter values are tested
-    on_request  whether it is tested only if it is named
+    samples     whether it tests `sample`; for a material that needs a guide, few other parameter values are tested
+    on_request  whether it is tested only if it is requested by name
     """
 
     family: ClassVar[Family[Law]]
@@ -52,7 +52,7 @@ class Law:
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterable[Ratio | Cause]:
         """Ratios from which the cause of a failure may be determined, or causes that are already known, the best first.
-        Arguments as for `bias`."""
+        For the arguments, see `bias`."""
         return ()
 
 
@@ -69,8 +69,8 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
     sampled by the subject (for narrow lobes), and a third near grazing angles.
 
     seed   seed of the directions
-    exact  whether they are 64-bit unit vectors; else they are rounded to float32, so that both precisions get the same
-           input
+    exact  whether they are float64 unit vectors; if not, they are rounded to float32, so that both precisions get the
+           same input
     """
     key = f"pairs {count} {seed} {exact}"
     if key not in subject.memo:  # several laws use the same pairs
@@ -97,7 +97,7 @@ def _pairs(subject: Subject, count: int, seed: int, exact: bool) -> tuple[np.nda
         wo, wi = directions.single(wo), directions.single(wi)
     try:
         drawn = subject.sampler.sample(wo[third : 2 * third], directions.numbers(rng, third))
-    except Fault:  # the laws of sampling report it; the others need no samples
+    except Fault:  # the laws that test sampling report it; the others need no samples
         return wo, wi
     good = (drawn.pdf > 0.0) & np.all(np.isfinite(drawn.wi), axis=1)
     wi[third : 2 * third][good] = drawn.wi[good]
@@ -116,8 +116,8 @@ def rounding(
 ) -> np.ndarray:
     """The change of a value if both directions change by ALLOWED rounding errors of float32 (6e-8 each), (N, channels).
 
-    Narrow lobes magnify the rounding error of a half vector by 1 / alpha, and a step within this distance may be
-    crossed; no float32 code can be more accurate.
+    Narrow lobes magnify the rounding error of a half vector by 1 / alpha, and a step of the value may lie within this
+    distance; no float32 code can be more accurate.
 
     function  function (wo, wi) that returns the values, (N, channels)
     times     number of random changes
@@ -125,7 +125,7 @@ def rounding(
     rng = np.random.default_rng([seed, 2])
     value = function(wo, wi)
     slope, step = np.zeros_like(value), np.zeros_like(value)
-    together = max(1, ROWS // max(3 * len(wo), 1))  # changes of direction per call: calls with few rows cost as much
+    together = max(1, ROWS // max(3 * len(wo), 1))  # changes per call: a call with few rows takes as long
     for first in range(0, times, together):
         moved: list[tuple[np.ndarray, np.ndarray]] = []
         for _ in range(min(together, times - first)):
@@ -151,7 +151,7 @@ def beyond_rounding(
     """The relative difference of a and b, (N, channels), beyond the effect of rounding the directions on `function`.
 
     Rounding is not considered for pairs whose difference is below a hundredth of the tolerance. Pairs above the
-    tolerance are examined again with more changes of direction, since four may miss the steepest change of a value.
+    tolerance are examined again with more changes of direction, because four may miss the steepest change of a value.
 
     floor  smallest value by which differences are divided
     """

@@ -33,7 +33,7 @@ class Calls(Law):
     name = "calls"
     title = "results do not depend on how a renderer calls the BSDF"
     everywhere = False  # it does not depend on the parameter values
-    meaning = "Unit tests pass but pictures are wrong: only integrators call a BSDF in these ways."
+    meaning = "Unit tests pass, but pictures are wrong, because only integrators call a BSDF in these ways."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         finding = Finding(0.0, 0.0, "no difference is allowed", shown="no differences")
@@ -57,9 +57,9 @@ class Calls(Law):
         wrong: list[Answer] = finding.details  # type: ignore[assignment]
         worst = max(wrong, key=lambda answer: answer.share)
         if worst.share > 0.0:
-            return severity.Bias(min(worst.worst, 1.0), min(worst.share, 1.0), 0.0, f"caused by {worst.what}", "bias")
+            return severity.Bias(min(worst.worst, 1.0), min(worst.share, 1.0), 0.0, f"check: {worst.what}", "bias")
         names = ", ".join(dict.fromkeys(answer.what for answer in wrong))
-        return severity.Bias(0.0, 0.0, 0.0, f"only callers of {names} are affected", "interface")
+        return severity.Bias(0.0, 0.0, 0.0, f"only renderers that use the following are affected: {names}", "interface")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
         wrong: list[Answer] = finding.details  # type: ignore[assignment]
@@ -68,23 +68,26 @@ class Calls(Law):
                 name, other, wo, wi, got, all_rows = answer.rows
                 yield Ratio(name, other, wo, wi, got, all_rows, subject)
         for answer in wrong:
-            words = SUSPECTS.get(answer.what, f"not the formula, but {answer.what}: {answer.wrong}")
+            text = f"an interface error ({answer.what}), not an error of the formula: {answer.wrong}"
+            words = SUSPECTS.get(answer.what, text)
             if answer.what == "declared properties":
                 guess = next((guess for start, guess in FACTS.items() if answer.wrong.startswith(start)), "")
-                words = f"{answer.wrong}: {guess}?" if guess else answer.wrong
+                words = f"{answer.wrong}; possible mistake: {guess}" if guess else answer.wrong
             yield Cause(words, f"calls {answer.what}")
 
 
-# the probable mistake behind a result that depends on the call
-_RAYS = "the result depends on the number of rays: an index or a buffer of fixed size?"
-_OTHER_RAYS = "the result for a ray depends on the other rays: a sum, a mean or a branch over all of them?"
+# the probable mistake if a result depends on the call
+_RAYS = "the result depends on the number of rays; possible mistake: an index or a buffer of fixed size"
+_OTHER_RAYS = (
+    "the result for a ray depends on the other rays; possible mistake: a sum, a mean or a branch over all of them"
+)
 SUSPECTS = {
     "a million rays per call": _RAYS,
     "one ray per call": _RAYS,
     "rays in another order": _OTHER_RAYS,
     "half of the rays disabled": _OTHER_RAYS,
     "textured parameters": "the value of one ray is used for other rays: is it derived only once for all of them?",
-    "a new object": "a call changes the results of later calls: state stored in the object?",
+    "a new object": "a call changes the results of later calls; possible mistake: state stored in the object",
 }
 # the mistake of the formula or of the declaration, by the first words of the difference from the declared properties
 FACTS = {
@@ -201,7 +204,7 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
 def _unlike(
     what: str, first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
 ) -> Answer:
-    """The largest relative difference above `same`, relative to the larger value, as text; "" if there is none."""
+    """The largest difference above `same`, relative to the larger of the two values, as text; "" if there is none."""
     lit = first["sample's pdf"][:, 0] > 0.0 if "sample's pdf" in first else np.ones(len(wo), bool)
     for name, a in first.items():
         b = second[name]
@@ -212,7 +215,7 @@ def _unlike(
             keep &= lit
         largest = float(np.max(np.abs(a[keep]), initial=0.0))
         size = np.maximum(np.maximum(np.abs(a), np.abs(b)), SMALL * largest)
-        difference = np.where(keep[:, None], np.abs(a - b), 0.0)  # positivity reports what is not finite at first
+        difference = np.where(keep[:, None], np.abs(a - b), 0.0)  # positivity reports values that are not finite
         off = difference / np.where(keep[:, None], np.maximum(size, DARK), 1.0)
         off = np.where(np.isnan(off), np.inf, off).max(1)
         # rounding differs between kernels; a lobe of width 1e-4 magnifies it, in a few rows
@@ -231,7 +234,7 @@ def _short(values: np.ndarray) -> str:
 
 
 def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
-    """Check that reflection does not depend on the mode, and transmission only by one factor per side."""
+    """Check that reflection does not depend on the mode, and that transmission differs by one factor per side."""
     radiance, power = (subject.eval(wo, wi, mode) for mode in ("radiance", "importance"))
     through = wo[:, 2] * wi[:, 2] < 0.0
     same = SAME[subject.best]
@@ -248,7 +251,7 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
         ratio = radiance[rows].sum(1) / power[rows].sum(1)
         if np.ptp(ratio) > max(10.0 * same, 1e-3) * np.median(ratio):
             ends = f"from {ratio.min():.4g} to {ratio.max():.4g}"
-            return f"in transmission, the ratio of radiance to power varies {ends}, but an index gives one factor"
+            return f"in transmission, the ratio of radiance to power varies {ends}, but an index gives a constant"
     return ""
 
 
@@ -261,7 +264,7 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
     if not along:
         return
     odd = np.arange(len(wo)) % 2 == 1
-    # some increase and others decrease, so that their ratios change too
+    # some values increase and others decrease, so that their ratios change too
     shares = [(0.3, 0.6), (0.7, 0.25)]
     ends = [{axis.path: float(axis.at(shares[k % 2][end])) for k, axis in enumerate(along)} for end in (0, 1)]
     together = box.per_ray(subject, {path: np.where(odd, ends[1][path], ends[0][path]) for path in ends[0]})

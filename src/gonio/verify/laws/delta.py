@@ -1,4 +1,4 @@
-"""Delta lobes: mirrors and smooth glass obey Snell's law, Fresnel's equations and reciprocity like any other lobe."""
+"""Delta lobes: mirrors and smooth glass obey Snell's law, Fresnel's equations and reciprocity."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ CHECKS64 = (lobe_checks.float32, lobe_checks.derivatives)  # for models with flo
 
 class DeltaLobes(Law):
     """A delta lobe lies in the mirror direction or follows Snell's law, has the factor (eta_o / eta_i)^2 in radiance,
-    reflects by Fresnel's equations for its own index, is reciprocal, and is chosen as often as its pdf states."""
+    reflects by Fresnel's equations for its own index, is reciprocal, and is sampled with the stated probability."""
 
     number = 10
     samples = True
@@ -66,7 +66,7 @@ class DeltaLobes(Law):
         if misses:
             worst = max(misses, key=lambda miss: miss.size)
             finding.figure = worst.size
-            finding.shown = f"off by {worst.size:.2g}" if np.isfinite(worst.size) else "a lobe is missing"
+            finding.shown = f"error {worst.size:.2g}" if np.isfinite(worst.size) else "a lobe is missing"
             finding.worst = _pair(worst)
         finding.trials += _frequencies(subject, effort, seed)
         return finding
@@ -92,16 +92,18 @@ class DeltaLobes(Law):
 
 
 def _choice(share: np.ndarray, pdf: np.ndarray, carried: np.ndarray) -> str:
-    """The mistake in the frequency of lobes, their stated probability or their weight; "" if none is clear."""
+    """The mistake in the frequency of lobes, in their stated probability or in their weight; "" if none is evident."""
     sampled = (share > 0.02) & (pdf > 0.0)
     if sampled.sum() < 8:
         return ""
     share, pdf, weight = share[sampled], pdf[sampled], (carried[sampled] / pdf[sampled][:, None]).max(1)
     if np.all(np.abs(pdf - 1.0) < 1e-6) and np.mean(share < 0.97) > 0.2:
-        return "the pdf of delta samples is 1, but only some samples are delta samples: the probability of the lobe?"
+        words = "the pdf of delta samples is 1, but only some samples are delta samples"
+        return f"{words}; possible mistake: the probability of the lobe is missing"
     factor = weight / pdf
     if np.ptp(pdf) > 0.1 and np.ptp(factor) < 1e-3 * factor.mean():
-        return "the weight of delta samples is proportional to the probability of the lobe: a missing division by it?"
+        words = "the weight of delta samples is proportional to the probability of the lobe"
+        return f"{words}; possible mistake: the division by this probability is missing"
     off = np.abs(share - pdf)
     if np.mean(off > 0.03) > 0.2:
         row = int(np.argmax(off))
@@ -110,7 +112,7 @@ def _choice(share: np.ndarray, pdf: np.ndarray, carried: np.ndarray) -> str:
         one = float(np.median(share[clamped]))
         if np.abs(share[clamped] - one).max() < 0.02 or np.abs(share[clamped] - 1.0 + one).max() < 0.02:
             return f"{words}: is the probability clamped in one of the two?"
-        return f"{words}: two different formulas for the probability?"
+        return f"{words}; possible mistake: two different formulas for the probability"
     return ""
 
 
@@ -138,7 +140,7 @@ def _views(subject: Subject, effort: Effort, seed: int) -> np.ndarray:
 
 
 def _frequencies(subject: Subject, effort: Effort, seed: int) -> list[Trial]:
-    """Tests of whether each lobe is chosen as often as its pdf, which is a probability, states."""
+    """Tests of whether each lobe is sampled with the probability that its pdf states."""
     views = [(25.0, 40.0), (70.0, 200.0)] if effort.full else [(50.0, 100.0)]
     wo = np.concatenate(
         [[directions.at(t if side > 0 else 180.0 - t, p) for t, p in views] for side in subject.sides or (1,)]

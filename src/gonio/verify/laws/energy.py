@@ -30,14 +30,14 @@ FINER = 100.0  # how many times as accurate an integral is when it is repeated
 STATED = "the stated albedo"
 LOST = "loss in a white furnace:"
 COARSE = (10.0, 40.0, 60.0, 80.0)  # degrees of wo at which the parameters behind a loss are sought
-MOST_ALONE = 6  # parameters that are made lossless one at a time
+MOST_ALONE = 6  # largest number of parameters that are made lossless one at a time
 ELSEWHERE = 88.0  # degrees of the most oblique view at other parameter values
 GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where errors of Fresnel and masking terms appear first
 
 
 class Energy(Law):
-    """The directional albedo for power is at most 1 for every wo, both by quadrature of `eval` and by the model's own
-    sampling.
+    """The directional albedo for power is at most 1 for every wo, and the quadrature of `eval` and the model's own
+    sampling give the same albedo.
 
     albedo(wo) = int f*(wo, wi) |cos theta_i| dwi over both sides, where f* is f without the radiance factor of
     transmission.
@@ -46,7 +46,7 @@ class Energy(Law):
     number = 3
     name = "energy"
     title = "directional albedo <= 1; quadrature and sampling agree"
-    meaning = "An albedo above 1 adds light at each bounce, so that interiors glow; too low an albedo loses light."
+    meaning = "An albedo above 1 adds light at each bounce, so that interiors glow; one that is too low loses light."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         wo = _views(subject, effort)
@@ -76,8 +76,8 @@ class Energy(Law):
                 second = _sampling(subject, wo[i : i + 1], effort.furnace_samples, seed + 7919)
                 return _agreement(*(part[0] for part in (*integral, *second)))
 
-            text = f"albedo {value[i].mean():.5f} by quadrature, {mean[i].mean():.5f} by sampling"
-            text += f" at {theta[i]:.4g} degrees"
+            text = f"albedo {value[i].mean():.5f} by quadrature and {mean[i].mean():.5f} by sampling"
+            text += f", wo at {theta[i]:.4g} degrees"
             finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
         _stated(subject, wo, value, error, finding)
@@ -107,7 +107,7 @@ class Energy(Law):
             white = lossless_variant(subject)
             if white is not None and biases[-1].average == 0.0:
                 gained = estimators.gain_bias(white)
-                biases.append(dataclasses.replace(gained, where=f"{gained.where}, for the lossless variant"))
+                biases.append(dataclasses.replace(gained, where=f"{gained.where}, without absorption"))
         others = [problem for problem in finding.problems if not problem.startswith(STATED)]
         if others and (white := _judged_lossless(subject)) is not None:
             biases.append(estimators.loss_bias(white))
@@ -168,7 +168,7 @@ class Energy(Law):
                 guess = "a constant factor"
                 if factor == "2":
                     guess = "a constant factor, a lobe counted twice, or light sent to both sides of the surface"
-                words = f"the albedo is {factor} for every wo: {guess}?"
+                words = f"the albedo is {factor} for every wo; possible mistake: {guess}"
                 yield Cause(words, factor_key(float(a.mean())))
             return
         bad = np.abs(a - 1.0) > SPREAD
@@ -176,7 +176,7 @@ class Energy(Law):
         # a sharp edge, not a gradual rise
         if place and np.abs(a[bad] - 1.0).min() > 0.1 * np.abs(a[bad] - 1.0).max():
             words = f"{place.replace('from wi', 'from wo')}"
-            yield Cause(f"the albedo is {np.median(a[bad]):.4g} instead of 1 {words}", words)
+            yield Cause(f"unknown; the albedo is {np.median(a[bad]):.4g} instead of 1 {words}", words)
 
     def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
         """Check that the closed form of a material's albedo equals the integral of `eval`."""
@@ -201,7 +201,7 @@ class Energy(Law):
     def _furnace(
         self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: AlbedoCurves
     ) -> None:
-        """Test the lossless variant, with every albedo 1 and F = 1, whose loss is the light that the model neglects."""
+        """Test the lossless variant, with every albedo 1 and F = 1, which loses only light that the model neglects."""
         value, error = _quadrature(white, wo, effort, seed)
         curves.furnace = value
         gain = float((value - error).max() - 1.0)
@@ -230,7 +230,7 @@ class Energy(Law):
         finding.notes.append(text + (f", accurate to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
         claim = getattr(white.model, "lossless_tolerance", None)
-        # a claim is about the given values: others, such as a weight of 0, may leave nothing to reflect
+        # a claim refers to the given values: at others, such as a weight of 0, nothing may be reflected
         judged = effort.full or value.max() > 0.0
         if claim is not None and judged and lost[where] > claim + float(error.max()):
             finding.problems.append(
@@ -238,7 +238,7 @@ class Energy(Law):
             )
 
     def _one_at_a_time(self, subject: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding) -> None:
-        """Look for a gain with a single albedo or a single F set to 1, since another term may hide it if all are 1."""
+        """Look for a gain with a single albedo or F set to 1, because another term may hide it if all of them are 1."""
         if not effort.full or not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
             return
         white = {
@@ -263,7 +263,7 @@ class Energy(Law):
 
 
 def _judged_lossless(subject: Subject) -> Subject | None:
-    """The lossless variant, or the subject itself if it has no albedos to set and claims to lose nothing."""
+    """The lossless variant, or the subject itself if it has no albedos to set but claims to be lossless."""
     claimed = getattr(subject.model, "lossless_tolerance", None) is not None
     return lossless_variant(subject) or (subject if claimed else None)
 
@@ -290,7 +290,8 @@ def _never_sampled(curves: AlbedoCurves) -> Iterator[Cause]:
         mine = curves.wo[:, 2] * sign > 0.0
         if mine.any() and not curves.sampling[mine].any() and curves.quadrature[mine].max(1).min() > GAIN:
             words = f"for wo {side} the surface, no sample carries light although eval is positive"
-            yield Cause(f"{words}: a test of the side that is missing in one of the two?", f"never sampled from {side}")
+            guess = "a test of the side that is missing from `eval` or from `sample`"
+            yield Cause(f"{words}; possible mistake: {guess}", f"never sampled from {side}")
 
 
 def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
@@ -301,11 +302,11 @@ def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
         middle = float(np.median(factor))
         if np.abs(a - b).max() < SPREAD and np.ptp(factor) < SPREAD * middle:
             words = f"without absorption, {name} is {written(middle)} times the other channels for every wo"
-            yield Cause(f"{words}: a constant of that channel?", f"{factor_key(middle)} in {name}")
+            yield Cause(f"{words}; possible mistake: a constant in that channel", f"{factor_key(middle)} in {name}")
 
 
 def _gains_in_gray(subject: Subject, curves: AlbedoCurves, effort: Effort, seed: int) -> bool:
-    """Whether more light is reflected than arrives if every color is gray with the value of its largest channel."""
+    """Whether more light is reflected than arrives if all channels of every color have the value of the largest one."""
     gray = {
         name: (max(value),) * 3
         for name, parameter in subject.parameters.items()
@@ -319,7 +320,7 @@ def _gains_in_gray(subject: Subject, curves: AlbedoCurves, effort: Effort, seed:
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
     """Directions wo on each side of the surface that reflects or transmits: in equal steps of the cosine, along the
     normal, and near grazing angles."""
-    # not at midpoints: steps of a material lie at simple fractions, where the two precisions may take different sides
+    # not at midpoints: steps of a material lie at simple fractions, which the two precisions may round differently
     mu = (np.arange(effort.furnace) + 0.47) / effort.furnace
     # the normal itself as well, where tangents and azimuths are undefined
     theta = np.concatenate([np.degrees(np.arccos(mu)), (0.0, *GRAZING) if effort.full else (ELSEWHERE,)])
@@ -431,8 +432,8 @@ def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
 
 
 def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np.ndarray, heavy: np.ndarray) -> float:
-    """The p-value for the mean over the channels. If a single sample is comparable to the noise, the noise is
-    underestimated.
+    """The p-value for the mean over the channels. If the contribution of a single sample is comparable to the noise,
+    the noise is underestimated and is therefore increased.
 
     heavy  the largest single contribution
     """

@@ -41,7 +41,7 @@ class Gradients(Law):
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if "float64" not in subject.precisions:
-            raise DoesNotApply("finite differences need 64 bits, but this variant of Mitsuba is 32-bit")
+            raise DoesNotApply("finite differences need double precision, which this variant of Mitsuba lacks")
         if subject.stochastic:
             raise DoesNotApply("the material is stochastic: individual values are random")
         if not subject.has_density:
@@ -55,7 +55,7 @@ class Gradients(Law):
             parameter = labels[label]
             if max(np.max(np.abs(differences)), np.max(np.abs(exact))) < least:
                 if _steps(subject, label, parameter, wo, wi):
-                    problems.append(f"the derivative with respect to {label} is 0, but values change with it in steps")
+                    problems.append(f"the derivative with respect to {label} is 0, but eval changes with it in steps")
                 continue
             tried.append(label)
             skipped = max(skipped, 1.0 - float(smooth.mean()))
@@ -76,11 +76,14 @@ class Gradients(Law):
         return Finding(
             figure=worst,
             tolerance=TOLERANCE,
-            reason="finite differences are accurate to about 1e-6; kinks, where two step sizes disagree, are left out",
+            reason="finite differences are accurate to about 1e-6; pairs where two step sizes disagree are excluded",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             problems=problems,
-            notes=[f"tested: {', '.join(tried)}; {100.0 * skipped:.2f} % of pairs left out at kinks of eval"],
+            notes=[
+                f"tested: {', '.join(tried)}; {100.0 * skipped:.2f} % of direction pairs are excluded because eval has "
+                "a kink there"
+            ],
         )
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Bias:
@@ -114,9 +117,9 @@ class Gradients(Law):
 
 
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether a parameter with zero derivative changes nearly all values at once when it is changed by a third, and
-    also has zero derivative after this change. If that derivative is not zero, the parameter is only clamped at the
-    given value; if the values of pairs change one by one, it is the threshold of a step in space."""
+    """Whether changing a parameter with zero derivative by 30 % changes nearly all values at once, and its derivative
+    is zero after this change too. If that derivative is not zero, the parameter is only clamped at the given value; if
+    the values of pairs change one by one, the parameter is the threshold of a step in space."""
     value = tree.value_at(subject.model, path)
     if parameter.kind not in ("float", "alpha", "spectrum") or (parameter.kind != "spectrum" and np.ndim(value)):
         return False
@@ -138,8 +141,8 @@ def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi
 
 
 def _at_once(subject: Subject, path: str, ends: tuple[Any, Any], pair: tuple[np.ndarray, np.ndarray]) -> bool:
-    """Whether nearly all values change at the same value of the parameter. It is sought in the step with the most
-    changes, then in the part of this step with the most changes, and so on."""
+    """Whether nearly all values change at the same value of the parameter. The search continues in the step with
+    the most changes, then in the part of this step with the most changes, and so on."""
     low, high = 0.0, 1.0
     for _ in range(LEVELS):
         at = np.linspace(low, high, PARTS + 1)
@@ -200,7 +203,7 @@ def _derivatives(
 ) -> dict[str, _Derivatives]:
     """The derivatives with respect to the parameters at some paths, with steps relative to their sizes. All are
     computed at once by one kernel, each on its own rays, for which the others are moved by 0. If a result is not
-    finite, its parameter is moved alone, since 0 times the NaN of another derivative is NaN."""
+    finite, its parameter is moved alone, because 0 times the NaN of another derivative is NaN."""
     derivatives: dict[str, _Derivatives] = {}
     most = max(1, ROWS // len(wo))
     for first in range(0, len(paths), most):

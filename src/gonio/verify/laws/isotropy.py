@@ -32,14 +32,14 @@ class Isotropy(Law):
 
     number = 6
     name = "isotropy"
-    title = "isotropic, or anisotropic along the axes, as declared"
+    title = "isotropic or, if declared anisotropic, wider along the declared axis"
     meaning = "Highlights follow the tangents of the mesh where they should not, or stretch along the wrong axis."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if not subject.has_density:
             raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         if subject.stochastic:
-            raise DoesNotApply("the material is stochastic: the law `pdf` compares its samples with its pdf instead")
+            raise DoesNotApply("the material is stochastic: the law `pdf` tests its samples against its pdf instead")
         exact = subject.best == "float64"
         wo, wi = pairs(subject, effort.pairs, seed, exact)
         turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
@@ -52,9 +52,9 @@ class Isotropy(Law):
         finding = Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
-            reason="rotating directions has rounding errors of 1e-16; formulas with cancellation lose up to ten digits"
+            reason="rotation causes rounding errors of 1e-16; formulas with cancellation lose up to ten digits"
             if exact
-            else "float32, beyond a change of both directions by 8 ulps: rounding errors of the model's own sums",
+            else "beyond the effect of changing both directions by 8 ulps, only the model's own rounding errors remain",
             worst=pair_in_words(wo[row], wi[row]),
             at=(wo[row], wi[row]),
         )
@@ -74,7 +74,7 @@ class Isotropy(Law):
 
     @staticmethod
     def _drawn_along_axes(subject: Subject, first: Pair, second: Pair) -> bool:
-        """Whether the density of samples changes under rotation, as isotropic values may be sampled along the axes."""
+        """Whether the density of samples changes under rotation: isotropic values may be sampled anisotropically."""
         there, back = subject.pdf(*first), subject.pdf(*second)
         return bool(np.any(np.abs(there - back) > VISIBLE * np.maximum(there, back)))
 
@@ -119,7 +119,7 @@ class Isotropy(Law):
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         if any("axes swapped" in problem for problem in finding.problems):
             yield Cause(
-                "the lobe is wider along the axis with the smaller alpha: alpha_x and alpha_y exchanged?",
+                "the lobe is wider along the axis of the smaller alpha: are alpha_x and alpha_y exchanged?",
                 "axes exchanged",
             )
         elif not subject.isotropic and finding.figure > finding.tolerance:
@@ -129,10 +129,9 @@ class Isotropy(Law):
             turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
             there, back = subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
             if np.mean(np.abs(there - back) > 1e-3 * np.maximum(there, back)) < 1e-3:
-                words = (
-                    "values change when both directions are mirrored, but not when they rotate: a lobe on one side only"
-                )
-                yield Cause(f"{words}, due to the sine of an azimuth difference or a cross product?", "handed")
+                words = "values change when both directions are mirrored, but not when they rotate"
+                guess = "a lobe on one side only, due to the sine of an azimuth difference or a cross product"
+                yield Cause(f"{words}; possible mistake: {guess}", "handed")
                 return
             off = np.mean(np.abs(there - back) > 1e-3 * np.maximum(there, back), axis=0)
             names = [name for name, share in zip(("red", "green", "blue"), off, strict=False) if share > 0.01]
@@ -152,7 +151,7 @@ class Isotropy(Law):
                 f"{ROTATION} rotates the axes clockwise, but the convention is counterclockwise", "turn reversed"
             )
         return Cause(
-            f"only part of the formula rotates with {ROTATION}: a term uses directions in the unrotated frame", "turn"
+            f"only part of the formula rotates with {ROTATION}; a term uses directions in the unrotated frame", "turn"
         )
 
     def _difference(
@@ -190,7 +189,7 @@ class Isotropy(Law):
             widths = [_spread(subject.replace(**{name: (float(v), float(v))}))[2] for v in pair]
         except InputError:  # the material rejects equal values
             widths = [float(v) for v in pair]
-        # for exponents, the larger one gives the narrower lobe
+        # a larger exponent gives a narrower lobe
         apart = abs(widths[0] - widths[1]) > 1e-3 * max(widths)
         if apart and (along - across) * (widths[0] - widths[1]) < 0.0:
             wider = "x" if along > across else "y"
@@ -200,7 +199,7 @@ class Isotropy(Law):
 
 def _spread(subject: Subject) -> tuple[float, float, float]:
     """The second moments of `eval` over wi along the two axes, for wo along the normal; and their sum divided by the
-    light."""
+    reflected light."""
     turn = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "angle"), 0.0)
     phi0 = float(turn or 0.0)
     theta = np.geomspace(1e-4, 0.499 * np.pi, 400)

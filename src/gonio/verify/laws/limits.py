@@ -1,4 +1,4 @@
-"""Limits: a part that is switched off changes nothing."""
+"""Limits: parts that are switched off have no effect."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
 
 ROUNDINGS = 8
 TOLERANCE = ROUNDINGS * 2.0**-52
-SINGLE, DOUBLE = 2.0**-24, 2.0**-53  # unit of the rounding errors of `base.rounding`, and the same for 64 bits
+SINGLE, DOUBLE = 2.0**-24, 2.0**-53  # unit of the rounding errors of `base.rounding`, and the same for float64
 # For a material that declares no limits: words in the names of parameters that may be 0; the values that are compared
 # with 0; and the largest fraction of the change from the first of them to 0 that may remain at the last.
 WORDS = ("weight", "thickness")
@@ -27,12 +27,12 @@ STEP = 0.5
 
 
 class Limits(Law):
-    """At a declared limit, the muted parameters change no value of `eval`, and `eval` equals that of the model to which
+    """At a declared limit, the muted parameters have no effect on `eval`, and `eval` equals that of the model to which
     the material reduces.
 
-    All limits are compared at once, each on separate rays: on a quarter of them with the other parameters as given, on
-    the rest with random ones. The same parameter values as numbers instead of arrays must give the same result,
-    although the code of parts that are off is then omitted.
+    All limits are tested at once, each on its own rays. On a quarter of these rays, the other parameters have their
+    given values; on the rest, they have random values. Parameters given as numbers must give the same result as arrays
+    of these numbers, although the code of parts that are switched off is then omitted.
     """
 
     number = 12
@@ -108,7 +108,7 @@ def _finding(cases: list[_Case], wo: np.ndarray, wi: np.ndarray) -> Finding:
         figure=figure,
         tolerance=TOLERANCE,
         reason=f"{ROUNDINGS} float64 ulps, relative to the value or to the 90th percentile of all values",
-        worst=f"{worst.words}: {pair_in_words(wo[row], wi[row])}",
+        worst=f"{worst.words.removeprefix('where ')}: {pair_in_words(wo[row], wi[row])}",
         at=(wo[row], wi[row]) if failed else None,
         settings=dict(worst.limit.values) if failed else {},
         problems=[text for text, case in zip(said, failed, strict=True) if not case.number][:6],
@@ -144,7 +144,7 @@ def _cases(subject: Subject, wo: np.ndarray, wi: np.ndarray, seed: int) -> list[
         given = np.arange(count) % 4 == 0
         limited = subject.replace(**limit.values)
         plain = np.where(given[:, None], limited.eval(wo, wi), values[n])
-        text = "values for a number and for an array differ"
+        text = "results for number and array parameters differ"
         cases.append(_case(limit, text, one, _Side(limited, plain), wo, wi, number=True))
         names = [path for path in changed[n] if changed[n][path] is not blocks[n][path]]
         if names:
@@ -206,7 +206,7 @@ def _against_model(limit: Limit, one: _Side, wo: np.ndarray, wi: np.ndarray) -> 
         return []
     other = of(limit.equals(one.subject.model))
     side = _Side(other, other.eval(wo, wi))
-    return [_case(limit, "eval differs from the model without the layer", one, side, wo, wi)]
+    return [_case(limit, "eval differs from that of the model without the layer", one, side, wo, wi)]
 
 
 class _Side(NamedTuple):
@@ -240,8 +240,8 @@ def _case(
 def _block(
     subject: Subject, axes: Mapping[str, ranges.Axis], limit: Limit, rng: np.random.Generator, count: int
 ) -> dict[str, np.ndarray]:
-    """One value per pair for every parameter that may vary: the value at the limit if the limit sets the parameter,
-    else the given value for every fourth pair and random values for the others."""
+    """One value per pair for every parameter that may vary: the value at the limit if the limit sets the parameter;
+    otherwise, the given value for every fourth pair and random values for the others."""
     columns = {}
     for path, axis in axes.items():
         column = _draw(axis, rng, count)
@@ -283,7 +283,7 @@ def _values(
 
 
 def _draw(axis: ranges.Axis, rng: np.random.Generator, count: int) -> np.ndarray:
-    """Random values of a parameter: (N,), (N, 3) for a color, (N, 2) for two widths."""
+    """Random values of a parameter: (N,), (N, 3) for a color, (N, 2) for a pair of alphas."""
     columns = 3 if axis.kind in ("color", "spectrum") else 2 if axis.kind == "alpha" else 1
     values = np.asarray(axis.at(rng.uniform(size=(count, columns))), float)
     return values[:, 0] if columns == 1 else values
@@ -324,7 +324,7 @@ def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
     names = [axis for axis in ranges.axes(subject) if axis.low == 0.0 and any(word in axis.path for word in WORDS)]
     names = [axis for axis in names if "." not in axis.path and axis.kind == "float"]
     if not names:
-        raise DoesNotApply("the material declares no `limits`, and has no weight or thickness that can be 0")
+        raise DoesNotApply("the material declares no `limits` and has no weight or thickness that can be 0")
     figure, worst, row, value = 0.0, names[0].path, 0, 0.0
     for axis in names:
         try:
@@ -341,12 +341,12 @@ def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
     return Finding(
         figure=figure,
         tolerance=1e-3,
-        reason="a layer that fades out causes no jump",
+        reason="the effect of a layer must vanish continuously",
         worst=f"{worst} = {value:g} compared with 0: {pair_in_words(wo[row], wi[row])}",
         at=(wo[row], wi[row]) if figure > 1e-3 else None,
         settings={worst: 0.0},
         notes=[
-            "the material declares no `limits`; tested only for continuity at 0: "
+            "the material declares no `limits`; only continuity at 0 was tested, for "
             + ", ".join(axis.path for axis in names)
         ],
     )

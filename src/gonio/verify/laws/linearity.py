@@ -31,8 +31,8 @@ class Linearity(Law):
 
     number = 7
     name = "linearity"
-    title = "linear in albedos; a mix of materials is the mix of their values"
-    meaning = "Textures filtered or blended before shading do not look like the average of their colors."
+    title = "eval is linear in albedos and in the weight of a mix of materials"
+    meaning = "Textures that are filtered or blended before shading do not look like the average of their colors."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if not subject.has_density:
@@ -53,10 +53,10 @@ class Linearity(Law):
             row, size = worst_of(relative(a, b, 0.0, 1e-9 * float(np.max(np.abs(b), initial=0.0))))
             if size > tolerance and case != label:
                 # for example if one layer attenuates another by its brightest channel
-                notes.append(f"{label} is not linear between two colors: error {size:.2g}")
+                notes.append(f"eval is not linear in {label} between two colors: error {size:.2g}")
                 continue
             if size > tolerance and label != "mix" and _bounces(subject, label, wo, wi, effort.full):
-                notes.append(f"{label} acts more than once, as with multiple reflections: {size:.2g} from linear")
+                notes.append(f"{label} enters more than once, as in multiple reflections: nonlinearity {size:.2g}")
                 continue
             if size > worst:
                 worst, place, name = size, row, case
@@ -80,7 +80,7 @@ class Linearity(Law):
             return expected, value
 
         return severity.between(
-            subject, expected_first, f", for {MIXED if name == 'mix' else f'{name} between two other values'}"
+            subject, expected_first, f", for {MIXED if name == 'mix' else f'an interpolation of {name}'}"
         )
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
@@ -90,7 +90,7 @@ class Linearity(Law):
         wo, wi = pairs(subject, 4096, seed)
         power = _power_of(np.stack([subject.replace(**{name: x}).eval(wo, wi).mean(1) for x in GRAYS]))
         if power is not None:
-            text = f"values vary as {name}^{power:.3g}, within 1e-3: is a color decoded or multiplied twice?"
+            text = f"values vary as {name}^{power:.3g}, within 1e-3: is a color gamma-decoded, or multiplied twice?"
             yield Cause(text, f"{name}^{power:.3g}")
         mix = channels.mixed(subject, wo, wi)
         if mix is not None:
@@ -117,8 +117,8 @@ def _power_of(rows: np.ndarray) -> float | None:
 
 
 def _pairs(subject: Subject) -> dict[str, severity.Pair]:
-    """Values that should be equal: that at an albedo between two others, and that of a mixture, each with its
-    interpolation."""
+    """Pairs of values that should be equal: eval at an albedo between two others, or of a mixture of two materials,
+    and the interpolation of the two values."""
 
     def between(name: str, a: Value, b: Value) -> severity.Pair:
         low, high = subject.replace(**{name: a}), subject.replace(**{name: b})
@@ -129,7 +129,7 @@ def _pairs(subject: Subject) -> dict[str, severity.Pair]:
     names = [name for name, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0]
     cases = {name: between(name, 0.125, 0.875) for name in names}
     # a mean of the channels, or a difference of two, is linear in gray values: only colors reveal it
-    cases |= {f"{name}: in color": between(name, *COLORS) for name in names}
+    cases |= {f"{name}: saturated colors": between(name, *COLORS) for name in names}
     if isinstance(subject.model, BSDF):
         other = models()["lambert"]((0.2, 0.5, 0.8))  # type: ignore[call-arg]
         mixed = Subject(models()["mix"](subject.model, other, 0.25), "mix")  # type: ignore[call-arg]
@@ -147,8 +147,8 @@ def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray, given:
     several times; see `statistics.is_power_series` and `is_dimmed`.
 
     name   path of the albedo
-    given  whether the other colors have their given values; if not, the first power may be absent, since light that
-           hits a black part once is lost
+    given  whether the other colors have their given values; if not, the first power may be absent, because light
+           that hits a black part once is lost
     """
     rows = np.stack([subject.replace(**{name: v}).eval(wo[:2048], wi[:2048]).mean(1) for v in statistics.STEPS])
     noise = 1e-9 if subject.best == "float64" else 1e-4
@@ -156,7 +156,7 @@ def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray, given:
 
 
 def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether an albedo changes no value, as if a cache ignored it or the parameter were never read."""
+    """Whether an albedo has no effect on any value, as if a cache ignored it or the parameter were never read."""
     low, high = (subject.replace(**{name: v}) for v in (0.125, 0.875))
     first, second = low.eval(wo, wi), high.eval(wo, wi)
     if not np.array_equal(first, second) or not np.any(first > 0.0):

@@ -20,8 +20,8 @@ from ..subject import Subject
 from ..verdict import Finding, Trial
 from .base import Law, angles, pair_in_words, pairs, where_found
 
-# The cosines and squared sines of these angles are not simple fractions: steps of a material often lie there, where the
-# two precisions may take different sides.
+# The cosines and squared sines of these angles are not simple fractions. Steps of a material often lie at simple
+# fractions, where the two precisions may take different sides.
 ABOVE = (
     (0.0, 0.0),
     (12.0, 20.0),
@@ -137,21 +137,22 @@ class Pdf(Law):
         for view in above[:, None]:
             clamped = _clamped(there, view, seed)
             if clamped:
-                yield Cause(f"{clamped}: a clamped random number, which the pdf does not account for?", "u clamped")
+                guess = "a clamped random number, which the pdf does not account for"
+                yield Cause(f"{clamped}; possible mistake: {guess}", "u clamped")
         for note in finding.notes:
             if note.startswith(UNUSED):
                 yield Cause(note, "pdf where no samples are generated")
 
 
-UNUSED = "the pdf integrates to"  # begins the note about a side that is never sampled
+UNUSED = "the pdf integrates to"  # start of the note about a side that is never sampled
 ALL, LACKING = 0.995, 0.03  # least fraction of samples that do not fail, and of samples that the pdf lacks
 MISSING = 0.01  # largest fraction of samples that the pdf predicts but that do not occur
 STEEP = 0.7  # largest ratio of the pdf's deficit near the normal to its deficit at an oblique view
 
 
 def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[Cause]:
-    """Yield a cause if no sample fails and the pdf predicts too few samples for some views and too many for none, with
-    a deficit that increases with the angle of the view."""
+    """Yield a cause if no sample fails, and the pdf predicts too few samples for some views and too many for none, by a
+    deficit that increases with the angle of the view."""
     above = [tested for tested in tests if tested.wo[2] > 0.0]
     if len(above) < 2 or min(tested.cells.observed.sum() / tested.cells.drawn for tested in above) < ALL:
         return
@@ -160,10 +161,10 @@ def _from_below(subject: Subject, tests: list[_Tested], seed: int) -> Iterator[C
         return
     near = _chi_square(subject, FEW, seed, directions.single(directions.at(np.array([ABOVE[1][0]]), ABOVE[1][1])))
     if near and 1.0 - near[0].total < STEEP * lacking[-1]:
-        shares = ", ".join(f"{share:.2g} at {angles(one.wo)}" for share, one in zip(lacking, above, strict=True))
-        words = f"no sample fails, but the integral of the pdf is less than 1, by {shares} degrees of wo"
+        shares = ", ".join(f"{share:.2g} for wo at {angles(one.wo)}" for share, one in zip(lacking, above, strict=True))
+        words = f"no sample fails, but the integral of the pdf is less than 1 (by {shares} degrees)"
         guess = "directions below the horizon that are mirrored or clamped instead of failing"
-        yield Cause(f"{words}: {guess}?", "samples from below")
+        yield Cause(f"{words}; possible mistake: {guess}", "samples from below")
 
 
 def _missing(cells: SampleCells) -> float:
@@ -265,8 +266,8 @@ def _misses_the_middle(wo: np.ndarray, wi: np.ndarray, fine: np.ndarray) -> bool
 
 _KINDS = {
     "fine": "chi-square test",
-    "coarse": "chi-square test in coarse cells",
-    "others": "samples outside all cells compared with 1 - (integral of the pdf)",
+    "coarse": "chi-square test with coarse cells",
+    "others": "binomial test of the samples outside all cells against 1 - (integral of the pdf)",
 }
 
 
@@ -326,7 +327,7 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
 
 
 def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> None:
-    """Check that pdf > 0 where eval > 0: sampling never reaches light elsewhere."""
+    """Check that pdf > 0 where eval > 0; otherwise, sampling misses this light."""
     if not subject.has_density:
         return
     wo, wi = pairs(subject, effort.pairs, seed)

@@ -42,9 +42,9 @@ class Positivity(Law):
         finding = Finding(
             figure=0.0,
             tolerance=0.0,
-            reason="no value may be negative or not finite",
+            reason="no value may be negative, infinite or NaN",
             notes=[
-                f"tested at the given parameter values and the ends of each range ({len(variants)} settings)"
+                f"tested at the given parameter values and at the ends of each range ({len(variants)} settings)"
                 if len(variants) > 1
                 else "tested at the given parameter values only"
             ],
@@ -141,12 +141,13 @@ class Positivity(Law):
         for words, rows in _exact_places(wo, wi):
             if bad.any() and not np.any(bad & ~rows) and (rows & bad).sum() > 0.2 * rows.sum():
                 guess = "a division by 0" if fault == "not finite" else "a term that is not clamped"
-                yield Cause(f"eval is {fault} only where {words}: {guess}?", f"{fault} where {words}")
+                text = f"eval is {fault}, but only where {words}; possible mistake: {guess}"
+                yield Cause(text, f"{fault} where {words}")
                 return
         yield from self._of_settings(subject, finding, effort, seed, fault, "eval")
         if place := place_of(wo, wi, bad) or within(wo, wi, bad):
-            guess = ": a term that is not clamped?" if fault == "negative" else ""
-            yield Cause(f"eval is {fault} only {place}{guess}", f"{fault} {place}")
+            guess = "; possible mistake: a term that is not clamped" if fault == "negative" else ""
+            yield Cause(f"eval is {fault}, but only {place}{guess}", f"{fault} {place}")
 
     def _of_settings(
         self, subject: Subject, finding: Finding, effort: Effort, seed: int, fault: str, what: str
@@ -163,7 +164,7 @@ class Positivity(Law):
             return False
 
         if words := extremes.of_parameters(subject, finding.settings, fault, fails):
-            yield Cause(f"{what} is {fault} {words}", f"{fault} for settings")
+            yield Cause(f"{what} is {fault}, but {words}", f"{fault} for settings")
 
 
 _FAULTS = {"not finite": lambda values: ~np.isfinite(values), "negative": lambda values: values < 0.0}
@@ -204,7 +205,7 @@ def _words(changed: dict[str, Any]) -> str:
 def _batches(
     subject: Subject, variants: list[tuple[dict[str, Any], Subject]], count: int
 ) -> list[tuple[list[dict[str, Any]], Subject]]:
-    """Settings combined in one call, with one value per ray, or one by one if the subject does not accept arrays.
+    """The settings, combined in one call with one value per ray, or one by one if the subject does not accept arrays.
 
     All parameters that have a range are arrays, so that one kernel serves the given values and all others.
     """
@@ -235,8 +236,8 @@ def _batches(
 
 
 def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of directions, at extreme angles on both sides (even on a side without values) and at random; and random
-    numbers."""
+    """Pairs of directions, at extreme angles on both sides of the surface (even on a side where `eval` is 0) and at
+    random; and random numbers."""
     theta = np.array([*THETA, *(180.0 - t for t in THETA[:-1])])
     pair = np.array(list(itertools.product(theta, theta, PHI)))
     random_o, random_i = pairs(subject, max(effort.pairs // 16, 2048), seed)
@@ -272,8 +273,8 @@ def _own_axes(subject: Subject) -> list[ranges.Axis]:
 
 
 def _corners(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
-    """The subject with all parameters at the low ends of their ranges, and with all at the high ends. Arrays with both
-    need the code of all parts, so that all other values share the same kernels."""
+    """The subject with all parameters at the low ends of their ranges, and with all at the high ends. Arrays that
+    contain both need the code of all parts; kernels compiled for them serve all other values too."""
     corners = []
     for end in ("low", "high"):
         values = {axis.path: getattr(axis, end) for axis in _own_axes(subject)}

@@ -1,4 +1,4 @@
-"""Precision: 32 bits agree with 64 bits."""
+"""Precision: float32 agrees with float64."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Precision(Law):
     number = 9
     name = "precision"
     title = "float32 agrees with float64"
-    meaning = "Speckles and rings depend on distance, angle and roughness."
+    meaning = "Speckles and rings appear at certain distances, angles and values of roughness."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if "float64" not in subject.precisions:
-            raise DoesNotApply("there is no 64-bit variant to compare with")
+            raise DoesNotApply("the BSDF cannot be evaluated in double precision")
         if subject.stochastic:
             raise DoesNotApply("the material is stochastic: individual values are random")
         if not subject.has_density:
@@ -55,8 +55,8 @@ class Precision(Law):
         return Finding(
             figure=worst,
             tolerance=TOLERANCE,
-            reason=f"beyond a change of the directions by {ALLOWED:g} ulps, only cancellation in sums is left",
-            shown=f"{worst:.1e}; 99.9 % of values agree within {plain:.1e}",
+            reason=f"beyond the effect of changing both directions by {ALLOWED:g} ulps, cancellation in sums remains",
+            shown=f"{worst:.1e}; 99.9 % of values agree to within {plain:.1e}",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             evidence=RoundingErrors(curve, np.abs(wo[:, 2]), np.abs(wi[:, 2])),
@@ -77,13 +77,14 @@ class Precision(Law):
         lost = ~np.isfinite(single) | ((single == 0.0) & (exact != 0.0))
         if bad.any() and lost.any(1)[bad].mean() > 0.5:
             words = "float32 is 0 or not finite where float64 is neither" + (f", {place}" if place else "")
-            yield Cause(f"{words}: a power or an exponential outside of float32's range, 1e-38 to 3e38?", "overflow")
+            guess = "a power or an exponential outside the range of float32, 1e-38 to 3e38"
+            yield Cause(f"{words}; possible mistake: {guess}", "overflow")
             return
         words = "float32 has fewer correct digits than expected" + (f", {place}" if place else "")
-        yield Cause(f"{words}: a difference of two nearly equal numbers?", "cancellation")
+        yield Cause(f"{words}; possible mistake: a difference of two nearly equal numbers", "cancellation")
 
 
 def _floor(values: np.ndarray) -> float:
-    """The smallest value by which differences are divided: a millionth of the bright values, but at least DARK, since a
-    lobe may be so narrow that 99 % of the pairs miss it, where float32 is 0."""
+    """The smallest value by which differences are divided: a millionth of the bright values, but at least DARK, because
+    a lobe may be so narrow that 99 % of the pairs miss it, and float32 gives 0 for these pairs."""
     return max(1e-6 * float(np.percentile(np.abs(values), 99.0)), DARK)

@@ -29,7 +29,7 @@ class Reciprocity(Law):
 
     number = 2
     name = "reciprocity"
-    title = "f(wo, wi) = f(wi, wo); in transmission f / eta^2"
+    title = "f(wo, wi) = f(wi, wo); in transmission, the same for f / eta^2"
     meaning = (
         "Pictures differ between path tracing, light tracing and photon mapping; bidirectional methods are biased."
     )
@@ -47,7 +47,7 @@ class Reciprocity(Law):
         wo, wi = wo[keep], wi[keep]
         error = _difference(subject, wo, wi, eta, exact)
         row, size = worst_of(error)
-        single = "float32, beyond a change of both directions by 8 ulps: rounding errors of the model's own sums"
+        single = "beyond the effect of changing both directions by 8 ulps, only the model's own rounding errors remain"
         return Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
@@ -80,11 +80,11 @@ class Reciprocity(Law):
                 is_inverse = abs(other * eta - 1.0) < 1e-3
                 text = "the inverse" if is_inverse else f"{eta:.4g}"
                 yield Cause(
-                    f"reciprocal for the index of the parameter, {other:.4g}, but `eta` of the samples is {text}",
+                    f"f is reciprocal for the index parameter, {other:.4g}, but `eta` of the samples is {text}",
                     "eta of samples",
                 )
         if abs(eta - 1.0) > 1e-3 and _reciprocal_with(subject, 1.0, seed):
-            text = "f(wo, wi) = f(wi, wo) also in transmission: is the factor (eta_o / eta_i)^2 of radiance missing"
+            text = "f(wo, wi) = f(wi, wo), even in transmission: is the factor (eta_o / eta_i)^2 of radiance missing"
             yield Cause(f"{text}, or should `eta` of the samples be 1?", "eta^2 in transmission")
         wo, wi = pairs(subject, PAIRS, seed, subject.best == "float64")
         there, back = (subject.f(wo, wi) * _scale(wo, wi, eta)[:, None], subject.f(wi, wo))
@@ -92,7 +92,7 @@ class Reciprocity(Law):
         if subject.isotropic and not subject.transmits and _difference_is_even(subject, seed):
             words = "f(wo, wi) - f(wi, wo) is the same for all azimuths"
             guess = "a base layer or compensation term that is attenuated for only one of the two directions"
-            yield Cause(f"{words}: {guess}?", "one direction of a base")
+            yield Cause(f"{words}; possible mistake: {guess}", "one direction of a base")
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
         """The finding for a stochastic model, from the means over many values per pair, in both orders of the
@@ -168,7 +168,7 @@ def _reciprocal_with(subject: Subject, eta: float, seed: int) -> bool:
 
 
 def _eta(subject: Subject, seed: int) -> float:
-    """The index below divided by that above, as the model's samples state it; 1 if nothing is transmitted."""
+    """The index below the surface divided by that above, from the model's samples; 1 if nothing is transmitted."""
     if not subject.transmits:
         return 1.0
     rng = np.random.default_rng([seed, 4])

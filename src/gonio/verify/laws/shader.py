@@ -1,4 +1,4 @@
-"""Shader code: written and read back, it has the values of the material."""
+"""Shader code: when it is read back, it gives the values of the material."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TOLERANCE = 1e-12  # most values are bit-identical
 
 
 class Shader(Law):
-    """The shader code of a material, read back, gives the material's values in 64 bits: GLSL, HLSL and WGSL."""
+    """The GLSL, HLSL and WGSL code of a material, read back and evaluated in float64, gives the material's values."""
 
     number = 13
     on_request = True
@@ -45,7 +45,7 @@ class Shader(Law):
         except InputError as error:
             raise DoesNotApply(f"no shader code: {error.what}") from error
         given = inputs(model, PAIRS, seed)
-        finding = Finding(0.0, TOLERANCE, "both are computed in 64 bits; only the order of sums may differ")
+        finding = Finding(0.0, TOLERANCE, "both are computed in float64; only the order of additions may differ")
         self._compare(model, given, seed, finding)
         finding.shown = f"{finding.figure:.1e}"
         return finding

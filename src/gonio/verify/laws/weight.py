@@ -46,15 +46,15 @@ class Weight(Law):
         finding = Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
-            reason="float64: both sides are the same formula and differ only by a few rounding errors"
+            reason="in float64, both sides are the same formula and differ only by a few rounding errors"
             if exact
-            else "float32, beyond a change of wi by 8 ulps: rounding errors of the model's own sums",
+            else "beyond the effect of changing both directions by 8 ulps, only the model's own rounding errors remain",
             worst=pair_in_words(wo[row], wi),
             at=(wo[row], wi),
             problems=problems,
         )
         if exact:
-            finding.notes.append(f"in float32: {figures[0][0]:.2e}")
+            finding.notes.append(f"error in float32: {figures[0][0]:.2e}")
         if subject.stochastic:
             return _expected(subject, finding, seed, effort)
         return finding
@@ -86,7 +86,7 @@ class Weight(Law):
             value = subject.eval(o, i, mode)
             if _gray(s.weight[rows]) and not _gray(value):
                 yield Cause(
-                    "the weight is gray but eval is colored: a mean over the channels, or a single channel?",
+                    "the weight is gray but eval is colored; possible mistake: a mean of the channels, or a single one",
                     "gray weight",
                 )
             clamped = _clamped(s.weight[rows], value / np.maximum(pdf, 1e-30), "eval / pdf")
@@ -172,8 +172,8 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
 
 
 def _clamped(weight: np.ndarray, right: np.ndarray, name: str) -> str:
-    """A description such as "clamped to at most 1" if all weights that differ from the correct ones have one value;
-    else "".
+    """A description such as "1 wherever eval / pdf is larger; ..." if all weights that differ from the correct ones
+    have the same value; otherwise "".
 
     weight, right  the weights and the correct weights, (N, channels) each
     name           name of the correct weights
@@ -190,9 +190,9 @@ def _clamped(weight: np.ndarray, right: np.ndarray, name: str) -> str:
         return ""
     rest = weight[~off]  # within the same bound
     if np.all(right[off] > values) and np.all(rest <= most * 1.001):
-        return f"{most:.4g} wherever {name} is larger: clamped to at most {most:.4g}?"
+        return f"{most:.4g} wherever {name} is larger; possible mistake: clamping to at most {most:.4g}"
     if np.all(right[off] < values) and np.all(rest >= most * 0.999):
-        return f"{most:.4g} wherever {name} is smaller: clamped to at least {most:.4g}?"
+        return f"{most:.4g} wherever {name} is smaller; possible mistake: clamping to at least {most:.4g}"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""Panels from other packages. The page's own panels are TypeScript: web/src/panels, one file each."""
+"""Panels from other packages. The page's own panels are TypeScript files in web/src/panels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The base of external panels: a class with a name, and a JavaScript file next to it."""
+"""The base class of external panels, each of which consists of a Python class and a JavaScript file next to it."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ...members import Family, subclasses_of
 
 
 class Panel:
-    """A tab of the page's dock, provided by another package.
+    """A tab below the page's picture, provided by another package.
 
         class Grazing(go.Panel):
             name = "grazing"         # its code is grazing.js, in the folder of the file with this class
 
-    The code calls `gonio.addPanel({id, title, mount(host, app), ...})`; web/src/panel.ts defines its members and
-    arguments. It runs in the page and in files written by `--export`. Only installed packages, and programs that
-    register one, can add panels, never a scene or a link.
+    The code calls `gonio.addPanel({id, title, mount(host, app), ...})`; web/src/panel.ts defines the members and
+    arguments. The code runs in the page and in files written by `--export`. Panels can be added only by installed
+    packages and by programs that register them, never by a scene or a link.
 
-    script  the JavaScript file, if its name differs from that of the panel
+    script  name of the JavaScript file, if it differs from that of the panel
     """
 
     name: ClassVar[str] = ""
@@ -40,7 +40,7 @@ def scripts() -> tuple[str, ...]:
     )
 
 
-@lru_cache  # cached, since the page's policy contains the hash of this text
+@lru_cache  # cached, because the page's policy contains the hash of this text
 def _read(file: Path) -> str:
     try:
         return file.read_text(encoding="utf-8").strip()

@@ -1,12 +1,12 @@
-"""Adapters to the shaders of engines: one folder per engine, which contains no text of the engine.
+"""Adapters to the shaders of rendering engines, one folder per engine. The folders contain no code of the engines.
 
     adopt_package("node_modules/three", "three")     writes three-standard.glsl, its adapter, and the tables it reads
 
-A program of ours includes the package's chunks and calls its functions; `package/` in an adapter stands for the folder
-of the package. A folder's module names the package (`PACKAGE`) and reads its tables (`tables`). An engine that is not
-on npm is recognized by a file of its repository (`MARK`). `replaced` returns replacements of words in the adapters that
-depend on the release, such as the arguments that a function takes. Shaders that an engine's JavaScript writes are
-obtained by running it (`generated`), only on request.
+A shader of Gonio includes the chunks of the package and calls its functions; `package/` in an adapter denotes the
+folder of the package. The module in an engine's folder names the package (`PACKAGE`) and reads its tables (`tables`).
+An engine that is not on npm is recognized by a file in its repository (`MARK`). `replaced` returns replacements for
+words in the adapters that depend on the release, such as the arguments of a function. If the JavaScript of an engine
+generates its shaders, they are obtained by running it (`generated`), but only on request.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ import numpy as np
 from .... import files
 from ....errors import InputError
 
-MAX_DESCRIPTION = 1 << 20  # bytes of a package.json
+MAX_DESCRIPTION = 1 << 20  # maximum size of a package.json in bytes
 
 
 class Engine(NamedTuple):
-    """An engine: the name of its package on npm, our programs, and its tables by file name.
+    """An engine: the name of its package on npm, Gonio's shaders for it, and its tables by file name.
 
-    mark       for an engine that is not on npm: a file of its repository, by which a checkout is recognized
-    replaced   replacements of words in the adapters that depend on the package's contents
-    generated  for an engine with a build whose JavaScript writes shaders: shaders and adapters by file name
+    mark       for an engine that is not on npm: a file in its repository by which a checkout is recognized
+    replaced   replacements for words in the adapters that depend on the content of the package
+    generated  for an engine whose JavaScript generates shaders: the shaders and their adapters by file name
     """
 
     package: str
@@ -45,9 +45,9 @@ class Engine(NamedTuple):
 
 
 class Package(NamedTuple):
-    """A user's package: its name and version from its package.json, and its folder.
+    """A package of the user: its name and version, from its package.json, and its folder.
 
-    A checkout has the name of its engine and no version.
+    A checkout has the name of the engine and no version.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Package(NamedTuple):
 
 
 def engines() -> dict[str, Engine]:
-    """All engines, by the names of their packages."""
+    """All supported engines, by the names of their packages."""
     modules = [importlib.import_module(f"{__name__}.{one.name}") for one in pkgutil.iter_modules(__path__)]
     return {
         one.PACKAGE: Engine(
@@ -94,15 +94,15 @@ def package_in(folder: str | os.PathLike[str]) -> Package:
 
 
 def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str], *, tsl: bool = False) -> list[Path]:
-    """Write the materials of an engine's package into a folder: each a .glsl or .wgsl with its adapter.
+    """Write the materials of an engine's package to a folder, each as a .glsl or .wgsl file with its adapter.
 
-    folder  the package as installed by npm, such as node_modules/three, or a checkout of an engine that is not on npm;
-            it is read again whenever a material is used
-    target  the folder to write, created if missing; the shaders refer to the package relative to it
-    tsl     whether to add the materials of three.js's TSL build, for which Node runs the package's JavaScript; they are
-            snapshots, which do not change with the package
+    folder  the package as installed by npm, such as node_modules/three, or a checkout of an engine that is not on npm.
+            It is read again whenever a material is used
+    target  the folder to write, which is created if it is missing; the shaders refer to the package by relative paths
+    tsl     whether to add the materials of three.js's TSL build, for which Node runs the JavaScript of the package.
+            They are snapshots, which do not change if the package changes
     Returns the shaders, one per material. Raises InputError if Gonio has no adapters for the package, or if its TSL
-    build is missing or cannot be read; MachineError without Node.
+    build is missing or cannot be read, and MachineError if Node is not installed.
     """
     package = package_in(folder)
     engine = engines()[package.name]
@@ -131,5 +131,5 @@ def adopt_package(folder: str | os.PathLike[str], target: str | os.PathLike[str]
 
 
 def _programs(folder: Path) -> list[Path]:
-    """Our shaders and adapters in an engine's folder."""
+    """Gonio's shaders and adapters in the folder of an engine."""
     return sorted(one for one in folder.iterdir() if one.is_file() and one.suffix != ".py")

@@ -1,2 +1,2 @@
-// The engine chooses between uniforms one by one, as here, and a uniform buffer.
+// The engine chooses between single uniforms, which are used here, and a uniform buffer.
 #include <pbrFragmentDeclaration>

@@ -1,4 +1,4 @@
-"""Babylon.js: its fragment program for PBRMaterial, and the table of its energy conservation."""
+"""Babylon.js: the fragment program for PBRMaterial, and the table for energy conservation."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from .....errors import InputError
 PACKAGE = "@babylonjs/core"
 _TABLE = "Misc/brdfTextureTools.js"
 _PICTURE = re.compile(r'_environmentBRDFBase64Texture\s*=\s*"data:image/png;base64,([A-Za-z0-9+/=]+)"')
-_GAMMA = 2.2  # of `toLinearSpace` without USE_EXACT_SRGB_CONVERSIONS
+_GAMMA = 2.2  # the exponent of `toLinearSpace` without USE_EXACT_SRGB_CONVERSIONS
 MAX_SIDE = 4096
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """The table of the split sum, rows by roughness, columns by n.v: bias, scale + bias, and the albedo of sheen.
+    """The split-sum table: bias, scale + bias, and the albedo of sheen, with rows by roughness and columns by n.v.
 
-    The PNG stores colors with a common divisor in alpha, which the engine expands to half floats on loading.
+    The PNG stores colors with a common divisor in alpha, which the engine converts to half floats when it loads the
+    file.
     """
     try:
         text = (package / _TABLE).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-// PBRMaterial of Babylon.js with sheen of its own roughness, and `sheen.albedoScaling = true`.
+// PBRMaterial of Babylon.js with a separate roughness of the sheen, and `sheen.albedoScaling = true`.
 #include <program>
 
 vec3 sheened( vec3 light, vec3 view, vec3 color, float rough, float metal, vec3 sheen, float sheenRough ) {

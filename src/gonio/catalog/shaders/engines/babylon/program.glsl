@@ -1,6 +1,6 @@
-// The fragment program of PBRMaterial of Babylon.js for a flat surface, lit by one directional light of irradiance 1 and
-// seen in linear color: what the material's class sets around the program, and then the package's own text, unchanged.
-// Uniforms and varyings become globals, which a function of ours assigns before it calls the program's main.
+// The fragment program of PBRMaterial of Babylon.js for a flat surface, lit by one directional light of irradiance 1,
+// with linear output colors: the definitions of the material's class, then the unchanged text of the package. Uniforms
+// and varyings become globals, which Gonio's function assigns before it calls the program's main.
 
 #define PBR
 #define METALLICWORKFLOW

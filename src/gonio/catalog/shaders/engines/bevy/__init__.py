@@ -1,4 +1,4 @@
-"""Bevy: its StandardMaterial under a directional light, from the WGSL of a checkout."""
+"""Bevy: StandardMaterial under a directional light, from the WGSL files of a checkout."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ MARK = "crates/bevy_pbr/src/render/pbr_lighting.wgsl"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """No tables: without DFG_LUT the shaders approximate the split sum by a polynomial."""
+    """No tables, because without DFG_LUT the shaders approximate the split sum by a polynomial."""
     return {}

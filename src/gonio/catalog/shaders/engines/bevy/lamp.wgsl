@@ -1,5 +1,5 @@
-// StandardMaterial of Bevy under one directional light of illuminance 1, for a flat surface: what `apply_pbr_lighting`
-// puts into LightingInput, and what `directional_light` makes of it, with the engine's own functions.
+// StandardMaterial of Bevy under one directional light of illuminance 1, for a flat surface: the LightingInput of
+// `apply_pbr_lighting`, and the computation of `directional_light`, with the functions of the engine.
 #define_import_path gonio::lamp
 
 #import bevy_pbr::lighting::{LightingInput, derive_lighting_input, Fd_Burley, F_AB, perceptualRoughnessToRoughness}

@@ -1,4 +1,4 @@
-"""The Khronos Group's glTF-Sample-Viewer: its BRDFs under one light, from the bundle in its package."""
+"""The Khronos Group's glTF-Sample-Viewer: the BRDFs under one light, from the bundle in the package."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ PACKAGE = "@khronosgroup/gltf-viewer"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """No tables: the viewer uses its own only for environments and sheen."""
+    """No tables, because the viewer uses tables only for environments and sheen."""
     return {}

@@ -1,5 +1,5 @@
-// What the loop over lamps in `pbrShader` of glTF-Sample-Viewer does for a flat surface and one lamp of irradiance 1, with
-// the package's own BRDFs: a dielectric mixes the diffuse and the specular lobe by F, and is then mixed with the metal.
+// The loop over lights in `pbrShader` of glTF-Sample-Viewer for a flat surface and one light of irradiance 1, with the
+// BRDFs of the package: F mixes the diffuse and specular lobes of a dielectric, which is then mixed with the metal.
 
 #define M_PI 3.141592653589793
 

@@ -1,4 +1,4 @@
-"""Godot 4: `light_compute` of its forward renderers, from the GLSL of a checkout."""
+"""Godot 4: `light_compute` of the forward renderers, from the GLSL files of a checkout."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from .....spirv.excerpts import functions_in
 
 PACKAGE = "godot"
 MARK = "servers/rendering/renderer_rd/shaders/scene_forward_lights_inc.glsl"
-_SIZE, _SAMPLES = 128, 1024  # of integrate_dfg.glsl
+_SIZE, _SAMPLES = 128, 1024  # size of the table and number of samples in integrate_dfg.glsl
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """The table of the split sum that the renderer computes when it starts: bias, scale + bias, 0.
+    """The split-sum table that the renderer computes when it starts, with the channels bias, scale + bias and 0.
 
-    Rows by decreasing roughness, columns by n.v. The integral and its sample points are those of Karis, "Real Shading
-    in Unreal Engine 4" (2013), with his masking for environments, k = alpha / 2; row y is computed for roughness
-    (128 - y + 1/2) / 128, one texel more than the roughness for which it is read.
+    The rows are ordered by decreasing roughness, the columns by n.v. The integral and its sample points are those of
+    Karis, "Real Shading in Unreal Engine 4" (2013), with his masking for environments, k = alpha / 2. Row y is computed
+    for the roughness (128 - y + 1/2) / 128, which is one texel more than the roughness for which it is read.
     """
     rows, columns = np.arange(_SIZE), np.arange(_SIZE)
     roughness, n_v = (_SIZE - rows + 0.5) / _SIZE, (columns + 0.5) / _SIZE
@@ -45,7 +45,7 @@ def tables(package: Path) -> dict[str, np.ndarray]:
 
 
 def replaced(package: Path) -> dict[str, str]:
-    """The defines in the adapters that depend on the checkout: the arguments that its `light_compute` takes."""
+    """The defines in the adapters that depend on the checkout, that is, on the arguments of its `light_compute`."""
     path = package / MARK
     try:
         text, _ = functions_in(path.read_text(encoding="utf-8", errors="replace"), "light_compute", str(path))
@@ -62,5 +62,5 @@ def replaced(package: Path) -> dict[str, str]:
 
 
 def _schlick(cosine: np.ndarray, k: float) -> np.ndarray:
-    """Schlick's masking, x / (x (1 - k) + k)."""
+    """Schlick's masking function, x / (x (1 - k) + k)."""
     return cosine / (cosine * (1 - k) + k)

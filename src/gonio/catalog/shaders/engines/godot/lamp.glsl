@@ -1,5 +1,5 @@
-// What the clustered forward renderer of Godot does for one directional light of irradiance 1 on a flat surface: its own
-// `light_compute`, then the colors that end its fragment program. Roughness and metallic are not rounded to 8 bits.
+// The clustered forward renderer of Godot for one directional light of irradiance 1 on a flat surface: the engine's
+// `light_compute`, then the final colors of its fragment program. Roughness and metallic are not rounded to 8 bits.
 
 #define M_PI 3.14159265359
 #define SPECULAR_SCHLICK_GGX

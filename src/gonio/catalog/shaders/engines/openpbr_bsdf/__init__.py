@@ -1,4 +1,4 @@
-"""Adobe's openpbr-bsdf: its GLSL interface, with its tables as textures."""
+"""Adobe's openpbr-bsdf: the GLSL interface, with the tables as textures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .....errors import InputError
 
 PACKAGE = "openpbr-bsdf"
 MARK = "impl/openpbr_bsdf.h"
-SIZE = 32  # entries along each axis of a table
+SIZE = 32  # number of entries along each axis of a table
 UNORM = 65535.0  # the number that represents 1 in the energy tables
 MAX_BYTES = 4 << 20
 _ENERGIES = {
@@ -22,22 +22,22 @@ _ENERGIES = {
     "opaque_dielectric_avg_energy_complement": 2,
     "ideal_metal_energy_complement": 2,
     "ideal_metal_avg_energy_complement": 1,
-}  # axes of each
+}  # number of axes of each table
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:[eE]-?\d+)?")
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """The energy tables, with 1 to 3 axes and one channel, and that of the fuzz, with 2 axes and three channels."""
+    """The energy tables, with 1 to 3 axes and one channel, and the fuzz table, with 2 axes and three channels."""
     energies = {}
     for name, axes in _ENERGIES.items():
-        shape = (*(SIZE,) * axes, 1) if axes > 1 else (1, SIZE, 1)  # the library reads its rows as textures of one row
+        shape = (*(SIZE,) * axes, 1) if axes > 1 else (1, SIZE, 1)  # the library reads rows as textures with one row
         energies[name] = _numbers(package, name, shape) / UNORM
     return {**energies, "ltc": _numbers(package, "ltc", (SIZE, SIZE, 3))}
 
 
 def _numbers(package: Path, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """The numbers in a header file of data."""
+    """The numbers in a header file that contains data."""
     path = package / "impl" / "data" / f"openpbr_{name}_data.h"
     try:
         if path.stat().st_size > MAX_BYTES:

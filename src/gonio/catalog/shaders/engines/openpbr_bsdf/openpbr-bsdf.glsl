@@ -1,5 +1,5 @@
-// openpbr-bsdf of Adobe: openpbr_eval of an opaque surface with coat and fuzz. Tables are textures. openpbr_sample
-// computes with the bits of its lobe's type, which Gonio does not read; its density is left out with it.
+// openpbr-bsdf of Adobe: openpbr_eval of an opaque surface with coat and fuzz. Its tables are textures. Sampling and
+// density are omitted, because openpbr_sample uses the bits of a lobe's type, which Gonio does not support.
 
 uniform sampler3D ideal_dielectric_energy_complement;
 uniform sampler2D ideal_dielectric_avg_energy_complement;
@@ -29,7 +29,7 @@ vec4 table3( int id, vec3 uvw ) {
 #define OPENPBR_SAMPLE_3D_TEXTURE(id, uvw) table3(id, uvw)
 #define OPENPBR_LANGUAGE_TARGET_GLSL 1
 
-// a function of the other languages that the GLSL face calls
+// a function of other languages, called by the GLSL version
 float atan2( float y, float x ) { return atan( y, x ); }
 
 #include "openpbr.h"

@@ -1,4 +1,4 @@
-"""three-gpu-pathtracer: its BSDF, with its own density and sampling."""
+"""three-gpu-pathtracer: the BSDF, with its own density and sampling method."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ PACKAGE = "three-gpu-pathtracer"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """No tables: all its terms are formulas."""
+    """No tables, because all terms are formulas."""
     return {}

@@ -1,5 +1,5 @@
-// three-gpu-pathtracer: bsdfResult and bsdfSample of an opaque surface, at the first hit of a path. Random numbers are
-// those of the call: u.z chooses the lobe, u.xy the direction.
+// three-gpu-pathtracer: bsdfResult and bsdfSample of an opaque surface, at the first hit of a path. Its random
+// numbers are the arguments: u.z chooses the lobe, u.xy the direction.
 
 #include <defines>
 

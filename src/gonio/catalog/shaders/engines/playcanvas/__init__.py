@@ -1,4 +1,4 @@
-"""PlayCanvas: its lit material under one light, from its GLSL chunks."""
+"""PlayCanvas: the lit material under one light, from the GLSL chunks of the package."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ PACKAGE = "playcanvas"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """No tables: the engine uses its own only for area lights and environments."""
+    """No tables, because the engine uses tables only for area lights and environments."""
     return {}

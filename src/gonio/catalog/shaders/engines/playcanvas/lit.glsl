@@ -1,5 +1,5 @@
-// What `litForwardBackend` and `lightFunctionLight` of PlayCanvas do for a flat surface under one directional light: the
-// chunks are the package's, their order is theirs. The gloss is 1 - roughness.
+// `litForwardBackend` and `lightFunctionLight` of PlayCanvas for a flat surface under one directional light: the chunks
+// and their order are those of the package. Gloss is 1 - roughness.
 
 #define LIT_SPECULAR
 #define saturate( x ) clamp( x, 0.0, 1.0 )

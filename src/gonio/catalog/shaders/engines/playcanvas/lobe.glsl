@@ -1,4 +1,4 @@
-// The chunk of the specular lobe, as the material chooses it.
+// The chunk of the specular lobe, chosen by the material.
 #ifdef ANISOTROPIC
 #include <lit/frag/lightSpecularAnisoGGX>
 #else

@@ -1,4 +1,4 @@
-// The lit material of PlayCanvas with anisotropy, which lies along the tangent.
+// The lit material of PlayCanvas with anisotropy along the tangent.
 #include <lit>
 
 vec3 anisotropic( vec3 light, vec3 view, vec3 color, float rough, float metal, float lamp, float strength ) {

@@ -1,4 +1,4 @@
-"""three.js: the fragment programs of WebGLRenderer and WebGPURenderer for its standard and physical materials."""
+"""three.js: the fragment programs of WebGLRenderer and WebGPURenderer for the standard and physical materials."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TABLE = "src/renderers/shaders/DFGLUTData.js"
 
 
 def tables(package: Path) -> dict[str, np.ndarray]:
-    """The table of the split sum, rows by n.v, columns by roughness: half floats of scale and bias."""
+    """The split-sum table: half floats of scale and bias, with rows by n.v and columns by roughness."""
     try:
         text = (package / _TABLE).read_text(encoding="utf-8")
     except OSError as error:

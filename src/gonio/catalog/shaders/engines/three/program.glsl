@@ -1,6 +1,6 @@
-// The fragment program of three.js for a flat surface, lit by one directional light of irradiance 1 and seen in linear
-// color: what WebGLRenderer sets around the program, and then the package's own text, unchanged. Uniforms and varyings
-// become globals, which a function of ours assigns before it calls the program's main.
+// The fragment program of three.js for a flat surface, lit by one directional light of irradiance 1, with linear output
+// colors: the definitions that WebGLRenderer puts before the program, then the unchanged text of the package. Uniforms
+// and varyings become globals, which Gonio's function assigns before it calls the program's main.
 
 #define HIGH_PRECISION
 #define NUM_SUN_LIGHTS 0

@@ -1,4 +1,4 @@
-// MeshPhysicalMaterial of three.js, with clear coat and sheen; each does nothing at 0.
+// MeshPhysicalMaterial of three.js, with clear coat and sheen; neither has an effect at 0.
 #include <program>
 
 vec3 physical( vec3 light, vec3 view, vec3 color, float rough, float metal, float index, vec3 specularTint,

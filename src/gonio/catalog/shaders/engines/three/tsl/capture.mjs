@@ -1,10 +1,10 @@
-// Prints the fragment programs that three.js writes for its node materials, as JSON by name: what WebGPURenderer hands
-// to the device to draw one frame. The device here draws nothing, so that Node suffices.
+// Prints the fragment programs of the node materials of three.js, as JSON by name: the code that WebGPURenderer passes
+// to the device for one frame. The device is a substitute that draws nothing, thus Node suffices.
 //
 //     node capture.mjs node_modules/three/build/three.webgpu.js
 import { pathToFileURL } from 'node:url';
 
-// An object that has every property, each of which can be called and does nothing; `own` has the ones that matter.
+// An object that has every property; each can be called and does nothing. `own` holds the properties with an effect.
 const inert = ( own = {} ) => new Proxy( function () {}, {
 	get: ( _, name ) => name in own || name === 'then' ? own[ name ] : name === Symbol.toPrimitive ? () => 0 : inert(),
 	apply: () => inert(),
@@ -25,8 +25,8 @@ globalThis.requestAnimationFrame = () => 0;
 globalThis.self = globalThis;
 globalThis.navigator ??= {};
 navigator.gpu ??= inert();
-console.log = console.info = console.warn = () => {}; // what it prints is the result alone
-console.error = ( ...words ) => errors.push( words.join( ' ' ) ); // three.js goes on with another material
+console.log = console.info = console.warn = () => {}; // only the result may be printed
+console.error = ( ...words ) => errors.push( words.join( ' ' ) ); // three.js would use another material
 
 const THREE = await import( pathToFileURL( process.argv[ 2 ] ) );
 const { float, vec2, vec3, uniform, varyingProperty } = THREE.TSL;
@@ -43,8 +43,8 @@ class LampNode extends THREE.AnalyticLightNode {
 
 }
 
-// What a material's properties are in its program: a constant, or a uniform, which has the name of the parameter of our
-// adapter to WebGLRenderer's program.
+// The properties of materials in their programs: a constant, or a uniform named after the parameter of Gonio's adapter
+// of WebGLRenderer's program.
 const number = ( name ) => uniform( 0.5 ).setName( name );
 const color = ( name ) => uniform( new THREE.Color() ).setName( name );
 const base = {
@@ -71,7 +71,7 @@ MATERIALS.iridescent[ 0 ].iridescenceThicknessNode = number( 'filmThickness' );
 const renderer = new THREE.WebGPURenderer( { canvas: inert( { width: 1, height: 1, style: {} } ), device } );
 await renderer.init();
 if ( Lamp.registerNode ) Lamp.registerNode( LampNode ); else renderer.library.addLight( LampNode, Lamp ); // before r187
-renderer.setRenderTarget( new THREE.RenderTarget( 1, 1, { type: THREE.FloatType } ) ); // so that it draws linear colors
+renderer.setRenderTarget( new THREE.RenderTarget( 1, 1, { type: THREE.FloatType } ) ); // for linear output colors
 
 function captured( material, properties ) {
 
