@@ -142,7 +142,7 @@ def test_an_installed_package_brings_one_for_the_command_line(scene: Path, tmp_p
     done = gonio("render", str(scene), "--integrator", "strangersOcclusion", "--spp", "4", "-o", "sky.exr")
     assert done.returncode == 0, done.stderr
     picture = images.read(tmp_path / "sky.exr")
-    assert np.all(picture.pixels == 1.0) and picture.metadata["integrator"] == "occlusion"
+    assert np.all(picture.pixels == 1.0) and picture.metadata["integrator"] == "strangersOcclusion"
     choices = json.loads(gonio("schema").stdout)["$defs"]["Integrator"]["properties"]["type"]["oneOf"]
     title = "The share of the sky that a surface sees, weighted by the cosine"
-    assert {"const": "occlusion", "description": title} in choices
+    assert {"const": "strangersOcclusion", "description": title} in choices

@@ -168,5 +168,5 @@ def test_caustics_make_the_picture_of_paths(seed: int) -> None:
 def test_particles_make_the_picture_of_paths(seed: int) -> None:
     scene = Scene(200 + seed, ROUGH, SURFACES + POINTS)
     agree(
-        scene.pictures("light", 1024), scene.pictures("path", 256), 0.02
+        scene.pictures("light", 4096), scene.pictures("path", 256), 0.02
     )  # few bright splats: heavier tails than Student's

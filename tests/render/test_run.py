@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
+from types import FrameType, SimpleNamespace
 
 import gonio as go
 import numpy as np
@@ -213,6 +213,43 @@ def test_same_seed_same_bits_whatever_the_passes(scene: Path, monkeypatch: pytes
     monkeypatch.setattr(passes, "PASS_SECONDS", 1e-9)  # passes of one sample
     assert np.array_equal(rendered(1), whole)
     assert not np.array_equal(rendered(2), whole)
+
+
+def test_a_request_passes_through_at_most_fifteen_files_before_its_first_ray(scene: Path) -> None:
+    """The files of the functions that are being called where a scene is read, where it is built, where the data of its
+    kernels are collected, and where its first ray is traced."""
+    source = Path(go.__file__).parent
+    moments = {
+        (str(source / "scene/text.py"), "read_json"),
+        (str(source / "scene/build.py"), "built"),
+        (str(source / "transport/scene_data.py"), "__init__"),
+        (str(source / "transport/surfaces.py"), "nearest"),
+    }
+    passed: list[str] = []
+    reached = set()
+
+    def profile(frame: FrameType | None, event: str, argument: object) -> None:
+        if event != "call" or frame is None:
+            return
+        moment = frame.f_code.co_filename, frame.f_code.co_name
+        if moment not in moments or moment in reached:
+            return
+        reached.add(moment)
+        stack = []
+        while frame is not None:
+            file = Path(frame.f_code.co_filename)
+            if file.is_relative_to(source):
+                stack.append(file.relative_to(source).as_posix())
+            frame = frame.f_back
+        passed.extend(stack[::-1])
+
+    sys.setprofile(profile)
+    try:
+        go.render(scene, spp=1)
+    finally:
+        sys.setprofile(None)
+    assert reached == moments
+    assert len(set(passed)) <= 15, list(dict.fromkeys(passed))
 
 
 def test_another_value_compiles_no_kernel(scene: Path) -> None:

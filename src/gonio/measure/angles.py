@@ -9,7 +9,6 @@ from .. import ops
 from ..ops import Direction, Scalar, backend, dot, function, sqr, vec3, where
 
 Floats = NDArray[np.float64]
-HALF_PI = 0.5 * ops.pi
 
 
 @function

@@ -76,7 +76,8 @@ class Reflecting(NamedTuple):
         """
         density = self.of_mean_width(wi) * self.scale
         if self.two is not None:
-            density = 0.5 * (density + self.two.larger.at(wi, self.ndf, self.masking) * self.two.larger.scale)
+            of_larger = self.two.larger.at(wi, self.ndf, self.masking) * self.two.larger.scale
+            density = 0.5 * (density + of_larger)
         return density * maximum(wi.z, 0.0)
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
@@ -151,11 +152,13 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
     F_avg: Array = base.mean_reflectance(average)
     anisotropic, true_mean = None, mean
     if two:
-        larger, smaller = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)
-        place = inset(sqrt(smaller / larger), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
+        larger = maximum(alpha.x, alpha.y)
+        ratio = minimum(alpha.x, alpha.y) / larger
+        place = inset(sqrt(ratio), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
         *channels, of_both = lookup(curves.anisotropic(*names), *place)
-        apart = minimum((1.0 - smaller / larger) / APART, 1.0)
-        anisotropic = TwoWidths(tuple(channels), alpha, surface.rotation, apart, _one_width(surface, larger))
+        apart = minimum((1.0 - ratio) / APART, 1.0)
+        of_larger = _one_width(larger, *names)
+        anisotropic = TwoWidths(tuple(channels), alpha, surface.rotation, apart, of_larger)
         true_mean = mean + apart * (maximum(of_both, 0.0) - mean)
     return Reflecting(
         c=tuple(c),
@@ -172,10 +175,11 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
     )
 
 
-def _one_width(surface: Microsurface, width: Scalar) -> OneWidth:
-    names = surface.ndf, surface.masking
-    *c, average = curves.coefficients(*names, width)
-    bend = knee(form_of(*names), surface.masking, width)
+@function
+def _one_width(width: Scalar, ndf: str, masking: str) -> OneWidth:
+    """M of one width and its lobe."""
+    *c, average = curves.coefficients(ndf, masking, width)
+    bend = knee(form_of(ndf, masking), masking, width)
     return OneWidth(tuple(c), bend, lobe.over_pi(maximum(average, 0.0)), inset(sqrt(width), curves.ROWS))
 
 

@@ -102,9 +102,9 @@ class AshikhminShirley(_Glossy):
 
 @function
 def _faded(cos: Scalar) -> Scalar:
-    """1 - (1 - cos / 2)^5."""
-    c = 1.0 - 0.5 * cos
-    return 1.0 - sqr(sqr(c)) * c
+    """1 - (1 - cos / 2)^5, multiplied out, because the difference would lose its digits at grazing angles."""
+    x = 0.5 * cos
+    return x * (5.0 - x * (10.0 - x * (10.0 - x * (5.0 - x))))
 
 
 @function

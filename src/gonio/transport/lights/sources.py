@@ -149,7 +149,6 @@ class Sources:
         self.kinds = [_kind(mi, emitter) for emitter in lights.emitters]
         self.known = sorted(set(self.kinds))
         sides = [getattr(emitter, "two_sided", False) for emitter in lights.emitters]
-        self.any_two_sided = any(sides)
         self.kind_of, self.two_sided = mi.UInt32(self.kinds), mi.Bool(sides)
         parallel = [mi.has_flag(emitter.flags(), mi.EmitterFlags.DeltaDirection) for emitter in lights.emitters]
         self.parallel = mi.Bool(parallel)
