@@ -1,8 +1,7 @@
 """Check of pictures of tables of E and E_avg, such as those of the homework, by the best-fitting form and its distance.
 
-Distances are root-mean-square differences in gray levels (0 to 255). A form is identified from the rows of roughness
-0.55 and above, where cosine sampling has converged. At lower roughness, a table computed by cosine sampling is noisy
-and too dark, which is not a mistake.
+Distances are root-mean-square differences in gray levels (0 to 255). Forms are identified from the rows of roughness
+0.55 and above; below, a table computed by cosine sampling is noisy and too dark, which is not a mistake.
 """
 
 from __future__ import annotations
@@ -135,8 +134,7 @@ class _Match(NamedTuple):
 def read(path: Path, channels: int = 1) -> Table:
     """The table in a picture or in an .npz array. Raises InputError for anything else.
 
-    channels  1, or 2 for a split sum, whose table is the sum of A in red and B in green; a gray picture contains the
-              sum itself
+    channels  1, or 2 for a split sum, stored as A in red and B in green; a gray picture contains their sum
     """
     if path.suffix.lower() == ".png" and _depth(path) == 16:
         raise InputError("a 16-bit picture given", path.name, "write 8 bits per channel, E * 255, as the homework does")
@@ -249,8 +247,7 @@ def _noise(values: Values) -> float:
 
 
 def _certain(best: _Match, matches: list[_Match]) -> Mistake | None:
-    """The mistake of the nearest match, described as probable if a correct form is almost as close; None if the nearest
-    match is correct."""
+    """The mistake of the nearest match, or None; described as probable if a correct form is almost as close."""
     if best.mistake is None:
         return None
     right = min((one.distance for one in matches if one.mistake is None), default=np.inf)
@@ -311,8 +308,7 @@ _FLOORS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 
 
 def _sampling(best: _Match, at: np.ndarray, size: int, low: np.ndarray, figures: dict[str, float]) -> list[str]:
-    """Sentences that describe the rows of low roughness: cosine sampling, a lower bound of D's denominator, and byte
-    values that wrap.
+    """Sentences about the rows of low roughness: cosine sampling, a lower bound of D's denominator, and wrapped bytes.
 
     The samples are random, so only the means of rows can be compared.
     """

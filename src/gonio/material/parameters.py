@@ -33,11 +33,11 @@ from .kinds import ChoiceParameter as ChoiceParameter
 from .kinds import Floats as Floats
 from .kinds import IndexParameter as IndexParameter
 from .kinds import IntegerParameter as IntegerParameter
-from .kinds import Material as Material
-from .kinds import Parameter as Parameter
-from .kinds import Value as Value
 from .kinds import has_two_values as has_two_values
 from .kinds import pair_of as pair_of
+from .node import Material as Material
+from .node import Parameter as Parameter
+from .node import Value as Value
 
 # --------------------------------------------------------------------------- types for checkers and editors
 

@@ -45,8 +45,7 @@ def render(
     sampler        source of the random numbers, such as "sobol"
     seed           seed of the random numbers; equal seeds give bit-identical pictures
     device         "cpu", "cuda" or "auto"
-    spectral       whether to trace wavelengths instead of red, green and blue, so that glass disperses light and lamps
-                   have their spectra
+    spectral       whether to trace wavelengths instead of red, green and blue: glass disperses, lamps have spectra
     threads        number of CPU cores to use; None uses all
     timeout        time in seconds after which the render stops and the unfinished picture is returned
     denoise        whether to denoise the picture with Open Image Denoise
@@ -55,14 +54,12 @@ def render(
     allow_code     whether the scene may run materials in Python files, such as "ward.py:Ward", and native Mitsuba
                    plugins in its folder `plugins`
     overrides      values by their paths in the scene, as in `gonio study`; a value may be a material
-    checkpoint     file to which the accumulated samples are written every few seconds. If it exists, the render
-                   continues from it, with bit-identical results. If None, a render of more than a minute writes a
-                   checkpoint next to the output
+    checkpoint     file for the accumulated samples, written every few seconds. If it exists, the render continues from
+                   it, with bit-identical results. None writes one next to the output after a minute of rendering
     until_error    render until the estimated relMSE of the picture is below this value, with at most `spp` samples per
                    pixel (65,536 if None); a warning is issued if these do not suffice
-    gradient       paths of numbers and colors of materials ("....albedo.r" is one channel), with respect to which the
-                   picture is differentiated. The result then contains the picture and its derivatives,
-                   (1 + paths, height, width, 3). Equal materials are differentiated together
+    gradient       paths of numbers and colors of materials ("....albedo.r" is one channel). The result then contains
+                   the picture and its derivatives, (1 + paths, height, width, 3). Equal materials count as one
     Warns (GonioWarning) about suspicious scenes, about clipping in a .png, and if the render continues from a
     checkpoint. Raises InputError for an invalid scene or option, MachineError if this machine cannot render it.
     """

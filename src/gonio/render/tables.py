@@ -69,20 +69,17 @@ def bake(
         go.bake("ggx", "tables").arrays["E"]            # [roughness, mu]
         go.bake("sky.hdr", "sky", ndf="beckmann")       # level_0, level_1 ... [theta, phi, rgb]
 
-    target    the name of a distribution (with F = 1), a material, or a latitude-longitude environment map (.hdr, .exr
-              or .npz), for which "prefiltered" is the only table
+    target    the name of a distribution (with F = 1), a material, or a latitude-longitude environment map (.hdr, .exr,
+              .npz), whose only table is "prefiltered"
     output    folder for the files, which are written completely or not at all; None writes no files
-    lut       tables to bake: any of "E", "Eavg", "dfg" and "glass", or only "ltc", which are linearly transformed
-              cosines, with shader code for quadrilateral area lights. None bakes every table except "glass" that
-              applies to the target
-    resolution  texels along each axis, 1 to 4096, by default 128; for "ltc", 2 to 256, by default 64, or 16 if the
-              target is anisotropic
+    lut       tables to bake: any of "E", "Eavg", "dfg" and "glass", or only "ltc", linearly transformed cosines with
+              shader code for quadrilateral area lights. None bakes all that apply to the target, except "glass"
+    resolution  texels per axis, 1 to 4096, by default 128; for "ltc", 2 to 256, by default 64, if anisotropic 16
     method    "quadrature", or the density to sample: "cosine", the name of the distribution, or "visible"
     samples   number of samples per texel, unless `method` is "quadrature"
     sampler   "hammersley", with the same points for every texel, or, with `seed`, "independent" or "stratified"
     masking   masking term of a distribution
-    layout    "linear" or "stretched" axes, or "homework": linear axes and the pictures of the homework, which show E
-              or, if `store` is "1-E", 1 - E
+    layout    "linear" or "stretched" axes, or "homework": also the homework's pictures of E, or of 1 - E by `store`
     flip      whether the bottom row of the homework's pictures has the lowest roughness
     wrap      whether values in these pictures are rounded down to bytes, with 256 wrapping around to 0
     aspect    alpha_y / alpha_x of a distribution, which adds an axis phi with `azimuths` entries
@@ -90,9 +87,8 @@ def bake(
     preset    "homework-text" or "homework-figure", whose options in PRESETS replace `masking`, `method` and others
     ndf       for an environment map: the distribution with which it is prefiltered; None selects ggx
     levels    for an environment map: the number of levels, for roughness 0 to 1; None selects 6, fewer for a small map
-    Tables of microfacets, except "ltc", are stored in the user's cache. Returns a `Baked` with the tables, `arrays`, by
-    name, and a `manifest`, which describes each table and states its error.
-    Raises InputError for invalid options or a folder that cannot be written, MachineError if the disk is full.
+    Tables of microfacets, except "ltc", are stored in the user's cache. Returns a `Baked`: `arrays` by name, and a
+    `manifest`, which describes each table and states its error. Raises InputError, MachineError if the disk is full.
     """
     if preset is not None:
         return _preset(target, output, preset, 128 if resolution is None else resolution, seed, store, flip)

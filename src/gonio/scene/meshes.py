@@ -229,10 +229,8 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
 
 
 def read_obj(data: bytes, path: Path, where: str) -> Triangles:
-    """Read the triangles of Wavefront OBJ data, from the lines v, vt, vn and f. Errors name `path` and `where`.
-
-    Polygons are divided into triangle fans; negative indices count from the end.
-    """
+    """Read Wavefront OBJ data, of which v, vt, vn and f are used. Polygons are divided into triangle fans; negative
+    indices count from the end. Errors name `path` and `where`."""
     columns: dict[bytes, list[list[float]]] = {b"v": [], b"vt": [], b"vn": []}
     corners: list[tuple[int, int, int]] = []
     needed = {b"v": 3, b"vt": 2, b"vn": 3}

@@ -91,10 +91,8 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
 
 
 def readable(name: str, path: Path, folder: Path, location: str, allow_outside: bool = False) -> str:
-    """The absolute path of a file of a scene, for Mitsuba.
+    """The absolute path of a file of a scene, for Mitsuba; errors give its `name` and its `location` in the scene.
 
-    name      name of the file in errors
-    location  location in the scene, for errors
     Raises InputError for a file that must not be opened, because it is outside the scene's folder, or because it is
     inconsistent and could cause memory errors in a C++ library.
     """
@@ -138,8 +136,7 @@ class _Reader:
     """The common state of all files of a scene.
 
     values   values of the parameters, by name
-    folders  folders that are searched for the files of plugins: those of <path> in the main file, then the folder of
-             the scene, then Mitsuba's own
+    folders  folders searched for files of plugins: those of <path> in the main file, the scene's, and Mitsuba's own
     """
 
     def __init__(self, file: Path, parameters: Mapping[str, str], allow_outside: bool, allow_code: bool) -> None:
@@ -161,11 +158,7 @@ class _Reader:
     # ------------------------------------------------------------------ files
 
     def parse(self, file: Path, folders: list[Path], included: Mapping[str, str] | None = None, level: int = 0) -> None:
-        """Append the content of a file.
-
-        folders   folders in which its files are searched
-        included  attributes of the element that includes the file
-        """
+        """Append a file, whose own files are searched in `folders`; `included` has the attributes of its <include>."""
         try:
             data = file.read_bytes()
         except OSError as error:
@@ -371,11 +364,8 @@ class _File:
         self.scene.parse(path, folders, attributes, self.level + 1)
 
     def _root(self, tag: str, attributes: dict[str, str]) -> str:
-        """The root element in the form in which it is written.
-
-        It is "" for an included scene, of which only the content is written. Any other included object gets the name of
-        its <include>.
-        """
+        """The root element as it is written: "" for an included scene, of which only the content is written; any other
+        included object gets the name of its <include>."""
         if tag not in OBJECTS:
             raise InputError(f"the file begins with <{tag}>", self.location, "a <scene> or another object is expected")
         (version,) = self._required(tag, attributes, "version")

@@ -20,7 +20,7 @@ SECOND_RADIATION = 1.438776877e7  # nm K, hc/k in Planck's law
 
 
 def emitted(light: Colour | LightSpectrum) -> PluginDict:
-    """The radiance of a light as a Mitsuba plugin: a spectrum if both the variant and the light are spectral, else rgb."""
+    """Radiance of a light as a Mitsuba plugin: a spectrum if both the variant and the light are spectral, else rgb."""
     if engine.load().is_spectral and not np.any(light.scale if isinstance(light, LightSpectrum) else light):
         return {"type": "uniform", "value": 0.0}  # Mitsuba rejects a `regular` spectrum that is 0 everywhere
     if isinstance(light, LightSpectrum) and engine.load().is_spectral:

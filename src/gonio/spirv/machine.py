@@ -1,9 +1,8 @@
 """Execution of a module's functions with the operations of `gonio.ops`.
 
 All lanes run together: each block runs under the mask of the lanes that reach it, which selects stores and results. A
-loop runs until no lane is left in it; its counter is a plain number, so the loop is unrolled. Loops whose end depends
-only on values that are not constant are rejected, and so are discard, atomics, barriers and all other constructs that
-have no meaning for a BSDF.
+loop runs until no lane is left in it; its counter is a plain number, so the loop is unrolled. Rejected are loops whose
+end depends only on values that are not constant, and discard, atomics, barriers and whatever has no meaning for a BSDF.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ WINDOW = 3 * TILE  # width in pixels of the window whose noise is averaged with 
 
 
 def squares(a: Picture, b: Picture) -> NDArray[np.float64]:
-    """The contribution of each pixel to the relMSE of the mean of two pictures with independent noise, (height, width)."""
+    """Contribution of each pixel to the relMSE of the mean of two pictures with independent noise, (height, width)."""
     true, floor = _agreed(a, b)
     result: NDArray[np.float64] = np.mean(0.25 * (a.astype(np.float64) - b) ** 2 / (true**2 + floor), axis=-1)
     return result

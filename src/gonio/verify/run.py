@@ -65,8 +65,7 @@ def verify(
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
     target    anything that `go.material` accepts, the name of a target as for `gonio verify`, or a list of these
-    vary      for a target given by name, values of one parameter, "alpha=0.01..1" (five) or "alpha=0.1,0.5"; there is
-              one card per value
+    vary      values of one parameter of a target given by name, "alpha=0.01..1" (five) or "alpha=0.1,0.5"; a card each
     quick     whether to run only a fast first check; `deep` uses more samples, directions and widths
     seed      seed of all random numbers, 1 if None; the same seed gives the same report
     law       name of a law, or a list of names; None selects all laws

@@ -60,7 +60,7 @@ def head_in(text: str) -> str:
 
 
 def file_in(text: str) -> Path | None:
-    """The shader file named by the string of a material, which may contain settings and options; None if there is none."""
+    """The shader file named by the string of a material, which may contain settings and options, or None."""
     head = head_in(text)
     return Path(os.path.expanduser(parted(head)[0])) if head else None
 

@@ -107,8 +107,7 @@ def verify(
     """Verify the energy conservation, reciprocity, sampling, gradients and precision of BSDFs.
 
     Each target is tested in a separate process, so a BSDF that crashes or hangs does not end the run. The exit code is
-    1 if a target violates a law without declaring the violation, or 4 if all such violations are too small to be
-    visible in a picture.
+    1 if a target violates a law without declaring it, or 4 if all such violations are too small to see in a picture.
 
     \b
     Examples:

@@ -191,29 +191,23 @@ def measure(
         go.measure(surface="gaussian:alpha=0.3", facet="mirror", output="rough.gonio")
 
     material     the material to evaluate, as for `go.material`; None to measure a surface
-    output       the file to write; its suffix selects the format: .binary, .bsdf, .brdf, .astm, .zbsdf or .gonio. None
-                 writes no file
+    output       the file to write, .binary, .bsdf, .brdf, .astm, .zbsdf or .gonio; None writes no file
     surface      the surface, a triangle mesh: gaussian, vgroove or spheres, with parameters after a colon; a file of
                  heights; or a `Surface` of your own
-    facet        material of the triangles, as a string or an object: "mirror", "lambert:albedo=0.8", "conductor:Au". If
-                 a string does not set alpha, the facets are smooth (alpha = 0)
-    table        kind of the table in a .gonio file: angles, half-difference, adaptive, specular or samples; "" selects
-                 the default
+    facet        material of the triangles: "mirror", "lambert:albedo=0.8", "conductor:Au"; smooth without an alpha
+    table        table of a .gonio file: angles, half-difference, adaptive, specular or samples; "" is the default
     theta_i, theta_r, phi  angles of incidence, viewing angles and azimuths between the two at which to measure,
                  degrees, for .gonio, .astm and .brdf files
-    solid_angle  solid angle of the detector, sr, over which f is averaged; None selects 0.006 for surfaces and 0 for
-                 materials
+    solid_angle  of the detector, sr, over which f is averaged; None selects 0.006 for surfaces, 0 for materials
     noise        relative standard deviation of a reading
     blocked      smallest possible angle between detector and lamp, degrees. At smaller angles, cells of MERL files are
                  invalid, samples are omitted, and other tables have the value at this angle
     bounces      the light to measure from a surface: "all", or that after the "first" or after "later" bounces
     samples      rays per angle of incidence
-    patches      number of patches of a random surface to measure, rounded up to a multiple of 8; the standard errors
-                 include the variation among patches
+    patches      patches of a random surface, a multiple of 8; standard errors include the variation among them
     seed         seed of the random numbers, 0 if None; equal seeds give equal values
     device       device for tracing rays: "cpu", "cuda" or "auto"
     progress     called with the number of rays traced and their total number
-
     Returns a `Readout`: the table with a standard error per value, the reflected energy, and the duration.
     Raises InputError for invalid arguments, and if the file cannot be written, before anything is computed.
     """

@@ -101,7 +101,7 @@ class ClearFaces(NamedTuple):
 
 @function
 def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar) -> Faces | ClearFaces:
-    """The faces of a film of real index film_eta >= 1 on a base of index eta + i k, or of real index eta; see `Film`."""
+    """The faces of a film of real index film_eta >= 1 on a base of index eta + i k, or real index eta; see `Film`."""
     sin2 = 1.0 - sqr(cos_i)
     inside = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
     contrast = (1.0 - film_eta) * (1.0 + film_eta)

@@ -205,7 +205,7 @@ def _rectangle(mi: ModuleType, row: OfVariant) -> Rectangle:
 
 
 def _fill(row: np.ndarray, kind: str, to_world: np.ndarray, flipped: bool) -> None:
-    """Fill the row of a lamp: position, side of the normal, and the axes and lengths of a rectangle or a ball's radius."""
+    """Fill the row of a lamp: position, side of the normal, and a rectangle's axes and lengths or a ball's radius."""
     side = -1.0 if flipped else 1.0
     if kind == "Sphere":
         row[0], row[1, 3], row[3, 0] = (*to_world[:3, 3], side), np.linalg.norm(to_world[:3, 0]), BALL
