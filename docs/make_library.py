@@ -1,4 +1,4 @@
-"""Write the parameters of the published fits as the package ships them: src/gonio/models/published/*.json.
+"""Write the parameters of the published fits as the package ships them: src/gonio/catalog/published/*.json.
 
     python docs/make_library.py FOLDER      # with bagher2012.json, low2012.json and ngan2005.json
 
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-TO = Path(__file__).parents[1] / "src" / "gonio" / "models" / "published"
+TO = Path(__file__).parents[1] / "src" / "gonio" / "catalog" / "published"
 SOURCES = {"ngan2005": "Ngan2005", "low2012": "Low2012", "bagher2012": "Bagher2012"}
 
 

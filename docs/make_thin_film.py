@@ -57,7 +57,7 @@ def exact(n: NDArray[np.complex128], film: float, thickness: float, degrees: flo
     return np.asarray((light @ np.array(reflected)) / light.sum(axis=1)) * WHITE
 
 
-def modelled(form: str, n: NDArray[np.complex128], film: float) -> Floats:
+def modeled(form: str, n: NDArray[np.complex128], film: float) -> Floats:
     """XYZ of an RGB material, (thickness, angle, 3), with the metal's index at 650, 550 and 450 nm."""
     three = np.interp(RGB_WAVELENGTHS, NM, n)
     rows, columns = np.meshgrid(THICKNESSES, np.radians(ANGLES), indexing="ij")
@@ -226,7 +226,7 @@ def main() -> None:
             n = index_of(symbol)
             truth[i, j] = [[exact(n, film, d, a) for a in ANGLES] for d in THICKNESSES]
             for form in FORMS:
-                models[form][i, j] = modelled(form, n, film)
+                models[form][i, j] = modeled(form, n, film)
     found = {form: delta_e(lab(xyz), lab(truth)) for form, xyz in models.items()}
     metals = [(METALS[s].name, lambda e, j=j: e[:, j]) for j, s in enumerate(SYMBOLS)]
     within = [[k for k, d in enumerate(THICKNESSES) if low <= d <= high] for low, high in BINS]

@@ -14,7 +14,7 @@ from gonio.catalog import notation
 from gonio.errors import InputError
 from gonio.fitting import batch, data, solver
 from gonio.fitting.certainty import degrees_of_freedom
-from gonio.fitting.fit import fit, modelled, moving_of, notes_on
+from gonio.fitting.fit import fit, modeled, moving_of, notes_on
 from gonio.fitting.parameters import Free, free_of, start_of
 from gonio.fitting.starts import starts_of
 from gonio.material import tree
@@ -445,7 +445,7 @@ def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.
         (lambda t: fit(t, "lambert", param={"rough": 1.0}), "rough"),
         (lambda t: fit(t, "lambert", param={"albedo": 0.3}), "no parameter is left"),
         (lambda t: fit(t, "lambert", grazing=0.0), "0 degrees"),
-        (lambda t: modelled("mirror+lambert"), "delta lobe"),
+        (lambda t: modeled("mirror+lambert"), "delta lobe"),
         (lambda t: batch.files_of([str(Path(__file__).parent / "nothing-there")]) and fit("nothing.binary"), "no file"),
     ],
 )

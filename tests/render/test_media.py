@@ -142,7 +142,7 @@ def test_light_that_is_sampled_inside_a_medium_is_dimmed_on_its_way(tmp_path: Pa
 @pytest.mark.slow
 @pytest.mark.parametrize("eye", [6.0, 0.0])
 def test_water_that_reaches_into_its_glass_is_as_if_it_touched(tmp_path: Path, eye: float) -> None:
-    """Glass from -2 to -1, water above it up to 1: modelled as water that begins inside the glass. From inside too."""
+    """Glass from -2 to -1, water above it up to 1: modeled as water that begins inside the glass. From inside too."""
     glass = slab(-2, -1, eta=1.5, absorption=0.2, priority=2)
     water = slab(-1.4, 1, eta=1.33, absorption=[0.02, 0.1, 0.3], priority=1)
     seen = rendered(tmp_path, [glass, water], eye=eye, spp=4096)

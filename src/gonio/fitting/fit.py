@@ -26,7 +26,7 @@ from ..measure.tables.samples import Samples
 from ..owner import public
 from .certainty import certainty, connected, degrees_of_freedom, information
 from .data import GRAZING, Data, data_of
-from .models import modelled as modelled
+from .models import modeled as modeled
 from .models import moving_of as moving_of
 from .models import moving_with_notes
 from .parameters import NAMES, Free, ranges, with_values

@@ -35,7 +35,7 @@ class Model(NamedTuple):
     least: Mapping[str, float] = {}
 
 
-def modelled(text: str, lobes: int = 1) -> Model:
+def modeled(text: str, lobes: int = 1) -> Model:
     """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=0.2)".
 
     lobes  number of copies of the last term of the sum
@@ -57,7 +57,7 @@ def modelled(text: str, lobes: int = 1) -> Model:
         own = Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {}))
         for path, value in stated.items():
             if isinstance(getattr(material, path, None), BSDF):  # an inner material, as in coat(base=lambert+ggx)
-                own = _with_constraints(own, path, modelled(value))
+                own = _with_constraints(own, path, modeled(value))
         made.append(own)
     combined = made[0]
     for other in made[1:]:
@@ -83,7 +83,7 @@ def moving_with_notes(
     model: MaterialLike, lobes: int, fixed: Mapping[str, object] | None, free: Sequence[str]
 ) -> tuple[BSDF, list[Free], list[str]]:
     """Like `moving_of`, with notes for the reader of the result."""
-    material, stays, least = modelled(str(model), lobes) if isinstance(model, str | Path) else Model(named(model))
+    material, stays, least = modeled(str(model), lobes) if isinstance(model, str | Path) else Model(named(model))
     given = {notation.path_of(material, path): value for path, value in (fixed or {}).items()}
     if given:
         written = {path: value for path, value in given.items() if isinstance(value, str)}
