@@ -25,6 +25,7 @@ the part of Gonio that raises them. Words in *italics* are placeholders for valu
 | 1 | a failed check: a law is violated, a tolerance is exceeded, or a result differs from its baseline |
 | 2 | bad usage or input (`InputError`) |
 | 3 | a resource that the machine lacks (`MachineError`): see `gonio doctor` |
+| 4 | laws are violated, but all violations are too small to be visible in pictures |
 | 128 + n | termination by signal n (130: Ctrl-C) |
 """
 TITLES = {

@@ -30,3 +30,9 @@ class Steep(Roof):
 def test_a_kink_at_the_given_value(material: type[go.BSDF], holds: bool) -> None:
     found = verify(material(), quick=True, law=["gradients"])["gradients"]
     assert found.failed != holds, found
+
+
+def test_a_parameter_is_not_called_tested_where_every_pair_has_a_kink() -> None:
+    found = verify(Roof(), quick=True, law=["gradients"])["gradients"]
+    (note,) = [note for note in found.notes if note.startswith("tested: ")]
+    assert "ridge" not in note.partition(";")[0] and note.endswith("the value of ridge for every direction pair")

@@ -47,7 +47,7 @@ class Gradients(Law):
         if not subject.has_density:
             raise DoesNotApply("all lobes are delta lobes, which have no values to differentiate")
         wo, wi = pairs(subject, effort.pairs // 8, seed)
-        worst, place, name, tried = -1.0, 0, "", []
+        worst, place, name, tried, untested = -1.0, 0, "", [], []
         skipped = 0.0
         problems: list[str] = []
         labels = dict(_numeric(subject.model))
@@ -56,6 +56,9 @@ class Gradients(Law):
             if max(np.max(np.abs(differences)), np.max(np.abs(exact))) < least:
                 if _steps(subject, label, parameter, wo, wi):
                     problems.append(f"the derivative with respect to {label} is 0, but eval changes with it in steps")
+                continue
+            if not smooth.any():
+                untested.append(label)
                 continue
             tried.append(label)
             skipped = max(skipped, 1.0 - float(smooth.mean()))
@@ -71,8 +74,9 @@ class Gradients(Law):
             row, size = worst_of(off)
             if size > worst:
                 worst, place, name = size, row, label
+        kinks = f"eval has a kink at the value of {', '.join(untested)} for every direction pair"
         if not tried and not problems:
-            raise DoesNotApply("no parameter affects the values")
+            raise DoesNotApply(kinks if untested else "no parameter affects the values")
         return Finding(
             figure=worst,
             tolerance=TOLERANCE,
@@ -82,7 +86,7 @@ class Gradients(Law):
             problems=problems,
             notes=[
                 f"tested: {', '.join(tried)}; {100.0 * skipped:.2f} % of direction pairs are excluded because eval has "
-                "a kink there"
+                f"a kink there{f'; not tested: {kinks}' if untested else ''}"
             ],
         )
 
