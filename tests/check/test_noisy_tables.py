@@ -30,10 +30,10 @@ def test_a_right_table_passes_with_its_noise(k: str, samples: int) -> None:
     [
         ({"change": "alpha = roughness"}, "alpha = roughness in place of roughness^2, in D"),
         ({"change": "alpha = roughness", "k": "text"}, "alpha = roughness in place of roughness^2, in D"),
-        ({"change": "no n.m"}, "(n.m), forgotten in the pdf"),
+        ({"change": "no n.m"}, "(n.m) is missing in the pdf"),
         ({"k": "(alpha + 1)^2 / 8"}, "k = (alpha + 1)^2 / 8"),
         ({"change": "transposed"}, "rows and columns exchanged"),
-        ({"change": "cosine twice"}, "the cosine of the light, twice"),
+        ({"change": "cosine twice"}, "the cosine of the light is applied twice"),
     ],
 )
 @pytest.mark.parametrize("seed", [1, 2, 3])

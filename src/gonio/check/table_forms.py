@@ -97,14 +97,14 @@ _KS = {
 }
 
 _WEIGHTS = {
-    "cos_i": "the cosine of the light, twice",
+    "cos_i": "the cosine of the light is applied twice",
     "2 cos_i": "the pdf 1 / (2 pi) of uniform directions for cosine-weighted ones",
-    "1 / cos_i": "the cosine of the light, forgotten",
-    "4 cos cos": "the denominator 4 (n.o)(n.i), forgotten",
-    "1 / 4 o.m": "the Jacobian 4 (o.m) of the half vector, forgotten in the pdf",
-    "o.m": "(o.m), twice",
-    "1 / o.m": "(o.m), forgotten in the weight",
-    "n.m": "(n.m), forgotten in the pdf of the normals",
+    "1 / cos_i": "the cosine of the light is missing",
+    "4 cos cos": "the denominator 4 (n.o)(n.i) is missing",
+    "1 / 4 o.m": "the Jacobian 4 (o.m) of the half vector is missing in the pdf",
+    "o.m": "(o.m) is applied twice",
+    "1 / o.m": "(o.m) is missing in the weight",
+    "n.m": "(n.m) is missing in the pdf of the normals",
     "schlick": "Schlick's F with R0 = 0.04, where F = 1 is asked for",
 }
 
@@ -204,11 +204,11 @@ def weightings(size: int, columns: int) -> tuple[Weighting, ...]:
     light = _with_width(at, mu, at**2).mean_of_light()
     ways = [Weighting("2 int E mu dmu", None, one * 2.0 * mu)]
     for words, weights in (
-        ("int E dmu: the weight 2 mu is forgotten", one + 0.0 * mu),
-        ("int E mu dmu: the factor 2 is forgotten", one * mu),
+        ("int E dmu: the weight 2 mu is missing", one + 0.0 * mu),
+        ("int E mu dmu: the factor 2 is missing", one * mu),
         ("4/3 int E dmu: 2 (n.l) of cosine-weighted directions l in place of 2 mu", one * 4.0 / 3.0 + 0.0 * mu),
         ("int E 2 (n.l) dmu with l of the sampled normals in place of 2 mu", light),
-        ("2 int E dmu: the weight mu is forgotten", 2.0 * one + 0.0 * mu),
+        ("2 int E dmu: the weight mu is missing", 2.0 * one + 0.0 * mu),
         ("2 int E mu^2 dmu: mu is applied twice", one * 2.0 * mu**2),
         ("4 int E mu dmu: the factor 2 is applied twice", one * 4.0 * mu),
         ("2 pi int E mu dmu", one * 2.0 * math.pi * mu),
