@@ -231,7 +231,7 @@ def _failures(engine: Engine, results: dict[str, Any]) -> list[str]:
 def _cell(one: dict[str, str]) -> str:
     if one["status"] != "fail":
         return {"does not apply": "-", "breaks as declared": "declared"}.get(one["status"], one["status"])
-    return f"**fails**: {one['grade']}" if one["grade"] else "**fails**"
+    return f"**fail** ({one['grade']})" if one["grade"] else "**fail**"
 
 
 def _again(engine: Engine, version: str) -> list[str]:

@@ -152,7 +152,7 @@ def _table(models: dict[str, Any]) -> list[str]:
 
 def _cell(one: dict[str, str]) -> str:
     if one["status"] == "fail":
-        return f"**fails**: {one['grade']}" if one["grade"] else "**fails**"
+        return f"**fail** ({one['grade']})" if one["grade"] else "**fail**"
     return {"does not apply": "-", "breaks as declared": "declared"}.get(one["status"], one["status"])
 
 

@@ -30,7 +30,7 @@ from gonio.verify.verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Verdict
 
 FOLDER = Path(__file__).parent / "report-cards"
 PROGRAMS = FOLDER / "programs"
-MARKS = {PASS: "pass", FAIL: "**fails**", DECLARED: "declared", NOT_APPLICABLE: "-"}
+MARKS = {PASS: "pass", FAIL: "**fail**", DECLARED: "declared", NOT_APPLICABLE: "-"}
 FURNACE = re.compile(r"(loss|gain) in a white furnace: (.*)")
 SHORT = [name for name, law in laws().items() if not law.on_request]
 
@@ -190,8 +190,14 @@ def page(target: str, report: Report) -> str:
             "|---|---|---|---|---|",
         ]
         for v in card.verdicts:
-            allowed = "" if v.tolerance is None or v.tolerance == float("inf") else f"{v.tolerance:.0e}"
-            grade = f": {v.grade}" if v.failed and v.grade else ""
+            allowed = (
+                ""
+                if v.tolerance is None or v.tolerance == float("inf")
+                else f"{v.tolerance:.0e}"
+                if v.tolerance
+                else "0"
+            )
+            grade = f" ({v.grade})" if v.failed and v.grade else ""
             lines.append(f"| {v.law} | {MARKS[v.status]}{grade} | {v.shown} | {allowed} | {_remark(v)} |")
         lines += ["", f"The material was {card.covered}."]
         if card.quality is not None:

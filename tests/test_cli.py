@@ -539,7 +539,7 @@ def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[st
     assert "alpha" in text and "Mitsuba plugin: gonio_conductor" in text
     assert "Source: src/gonio/materials/microfacet/conductor.py" in text
     assert gonio("explain", "phong") == 0
-    assert "Violates the law reciprocity by design: " in capsys.readouterr().out
+    assert "By design, this model violates the reciprocity law: " in capsys.readouterr().out
     assert "did you mean 'lambert'?" in failure(capsys, "explain", "lamberd")
 
 

@@ -185,7 +185,7 @@ def _use(found: manual.Page) -> str:
 
 def _laws(found: manual.Page) -> str:
     lines = [
-        f"The model violates the law **{law}** by design: {escaped(reason)}." for law, reason in found.breaks.items()
+        f"By design, this model violates the **{law}** law: {escaped(reason)}." for law, reason in found.breaks.items()
     ]
     card = ROOT / f"docs/report-cards/{found.name}.md"
     if card.exists():

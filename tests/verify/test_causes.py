@@ -275,7 +275,7 @@ def test_light_that_no_sample_finds_is_placed() -> None:
 @pytest.mark.slow
 def test_a_cascade_names_its_first_cause_once() -> None:
     report = verify(NoJacobianInSample(), quick=True, law=["energy", "weight"])
-    assert "(o.m)" in report["weight"].cause and report["energy"].cause == "follows from the failure of the law weight"
+    assert "(o.m)" in report["weight"].cause and "failure of the weight law" in report["energy"].cause
     text = str(report)
     assert text.index("weight: ") < text.index("energy: directional")
 

@@ -228,7 +228,7 @@ class Branches(go.BSDF):
 def test_a_branch_of_python_is_told_the_function_to_use_and_told_once() -> None:
     text = " ".join(str(verify(Branches(), quick=True)).split())
     assert text.count("ops.where(condition, a, b)") == 1 and "in eval" in text
-    assert "the same exception (follows from the failure of the law positivity)" in text
+    assert "the same exception (a consequence of the failure of the positivity law)" in text
 
 
 def test_a_page_begins_with_what_failed() -> None:

@@ -177,7 +177,7 @@ def test_the_report_holds_grades_and_a_sound_one_none() -> None:
     assert weight["grade"] == "visible" and weight["bias"]["kind"] == "lost" and weight["cause"]
     assert all(v["grade"] is None and v["bias"] is None and v["cause"] == "" for v in right["verdicts"])
     text = str(report)
-    assert "FAIL visible" in text and "effect" in text and "follows from the failure of the law weight" in text
+    assert "FAIL visible" in text and "effect" in text and "a consequence of the failure of the weight law" in text
 
 
 @pytest.mark.slow

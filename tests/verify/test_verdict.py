@@ -59,7 +59,7 @@ def test_an_exception_that_several_laws_meet_is_reported_once() -> None:
     report = verify(of(OneRow()), quick=True, law=["reciprocity", "isotropy", "linearity"])
     failed = [verdict for verdict in report.cards[0].verdicts if verdict.failed]
     assert len(failed) == 3 and all("eval returned shape" in verdict.why[0] for verdict in failed)
-    assert [verdict.cause for verdict in failed] == ["", *["follows from the failure of the law reciprocity"] * 2]
+    assert [verdict.cause for verdict in failed] == ["", *["a consequence of the failure of the reciprocity law"] * 2]
     assert str(report).count("eval returned shape") == 1
 
 

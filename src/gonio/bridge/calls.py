@@ -165,7 +165,8 @@ class _Trial:
             return f"a sample's eta is {eta[self.lit].min():.4g}: path tracers multiply radiance by its square"
         component = np.broadcast_to(np.asarray(self.drawn.sampled_component.numpy()), COUNT)
         if count and np.any(self.lit & (component >= count)):
-            return f"sampled_component is {int(component[self.lit].max())}, but component_count is {count}"
+            most = int(component[self.lit].max())
+            return f"sampled_component is {most}, which is out of range, since component_count is {count}"
         wi = np.broadcast_to(_rows(self.si.wi)[:, 2], COUNT)
         across = wi * _rows(self.wo)[:, 2] < 0.0
         transmits = all_ & (int(flags.Transmission) | int(flags.Null))

@@ -100,10 +100,10 @@ def run(
     report: Callable[[int, int, str], None] = lambda done, total, text: None,
     notice: Callable[[str], None] = lambda text: None,
 ) -> list[Row]:
-    """Fit each model to each file. With a single file, an error is raised; with several files, it is stored in
+    """Fit each model to each file. If a fit fails, the error is raised if there is a single file, or else stored in
     `failed`.
 
-    report  called before each file with the number of finished files, the number of all files, and the file's name
+    report  called before each file with the number of finished files, the total number of files, and the file's name
     notice  called at the start with a message if an earlier run has already fitted some of the files
     """
     settings = settings or Settings()

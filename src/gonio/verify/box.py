@@ -193,7 +193,7 @@ def _listed(words: list[str]) -> str:
 
 
 # the kinds of settings, in the order of the sentence
-_NAMES = {"choice": "with another option", "color": "with saturated colors"}
+_NAMES = {"choice": "with a non-default option", "color": "with saturated colors"}
 _NAMES |= {"pair": "with unequal widths along the two axes"}
 _NAMES |= {"corner": "with every parameter at an end of its range", "edge": "with one parameter at an end of its range"}
 _NAMES |= {"interior": "with random values", "jump": "just past a discontinuity"}

@@ -397,7 +397,8 @@ def _exceeds(finding: Finding, declared: bool) -> list[str]:
     """
     figure = finding.shown or f"{finding.figure:.3g}"
     allowed = finding.allowed or (f"{finding.tolerance:.3g}" if finding.tolerance else "")
-    words = [f"{figure}; {f'at most {allowed}' if allowed else 'none'} is allowed"]
+    measured = figure if " " in figure else f"measured value {figure}"
+    words = [f"{measured}; {f'at most {allowed}' if allowed else 'none'} is allowed"]
     return words + ["a violation is declared, but with size 0 for these parameter values"] * declared
 
 

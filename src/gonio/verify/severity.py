@@ -93,7 +93,7 @@ class Bias:
         if self.kind == "noise":
             return f"wasted samples, but no bias: {self.where}"
         if self.kind == "interface":
-            return f"pictures of a plain path tracer are correct; {self.where}"
+            return f"pictures rendered by a plain path tracer are correct; {self.where}"
         if self.kind == "derivatives" and not self.average:
             return f"pictures are correct, but derivatives are not finite: {self.where}"
         if self.kind == "derivatives":
@@ -105,6 +105,8 @@ class Bias:
                 return f"NaN only at isolated directions: {self.where}"
             text = f"values are negative or not finite for {percent(self.average)} of all pairs of directions"
             return f"{text}, {percent(self.worst)} at worst ({self.where})"
+        if not self.worst:
+            return "none"
         name = {"lost": "a loss", "gained": "a gain", "bias": "an error"}[self.kind]
         text = f"{name} of {percent(self.average)} of the reflected light on average, {percent(self.worst)} at worst"
         text += f" ({self.where})"

@@ -49,7 +49,7 @@ class Page:
             allowed = "<br>".join(f"`{key}`: {text}" for key, text in row.choices.items()) or row.range
             lines.append(f"| `{row.name}` | {row.kind} | {allowed} | {row.unit or '-'} | {default} | {row.doc} |")
         for law, reason in self.breaks.items():
-            lines += ["", f"Violates the law **{law}** by design: {reason}."]
+            lines += ["", f"By design, this model violates the **{law}** law: {reason}."]
         if self.presets:
             named = ", ".join(f"`{name}`{_also(name, title)}" for name, title in self.presets.items())
             lines += ["", f"Presets: {named}."]
@@ -76,7 +76,9 @@ class Page:
         if self.presets:
             named = ", ".join(f"{name}{_also(name, title)}" for name, title in self.presets.items())
             lines += [filled(named, 11, "  presets"), ""]
-        lines += [filled(f"Violates the law {law} by design: {reason}.", 0) for law, reason in self.breaks.items()]
+        lines += [
+            filled(f"By design, this model violates the {law} law: {reason}.", 0) for law, reason in self.breaks.items()
+        ]
         return "\n".join([*lines, f"Mitsuba plugin: {self.plugin}", f"Source: {self.source}"])
 
 

@@ -1,4 +1,4 @@
-"""Mistakes in the Oren-Nayar model (course sheet, eq. 2 and 3)."""
+"""Mistakes in the Oren-Nayar model (course sheet, eqs. 2 and 3)."""
 
 from __future__ import annotations
 

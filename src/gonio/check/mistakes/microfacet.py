@@ -1,4 +1,4 @@
-"""Mistakes in the terms D, G and F of a microfacet reflection (course sheet, eq. 4 to 12; homework, part C).
+"""Mistakes in the terms D, G and F of a microfacet reflection (course sheet, eqs. 4 to 12; homework, part C).
 
 The terms are taken from the material itself: F is f divided by f of a copy with F = 1, D has a closed form, and G is
 the remaining factor. Each mistake replaces one term.

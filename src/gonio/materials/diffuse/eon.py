@@ -19,7 +19,7 @@ from ...optics.frame import rotate, rotate_back, sin2
 from .lambert import Lambert
 
 # The albedo of FON (Fujii's Oren-Nayar) is A (1 + r G / pi). GRAZING is G(0) / pi, and AVERAGE the cosine-weighted mean
-# of G / pi (Portsmouth2025, eq. 17 and 21).
+# of G / pi (Portsmouth2025, eqs. 17 and 21).
 GRAZING = 0.5 - 2.0 / (3.0 * math.pi)
 AVERAGE = 2.0 / 3.0 - 28.0 / (15.0 * math.pi)
 FIT = (0.0571085289, 0.491881867, -0.332181442, 0.0714429953)  # coefficients of G / pi in powers of 1 - mu (eq. 64)
@@ -39,7 +39,7 @@ class Eon(BSDF):
     G = sin theta (theta - sin theta cos theta) + 2/3 (tan theta (1 - sin^3 theta) - sin theta)
     rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the color of light that bounces twice or more
 
-    Unlike `oren-nayar`, the model conserves all light at rho = 1 for any roughness and angle, has no dark ring at
+    Unlike `oren-nayar`, the model loses no light at rho = 1 for any roughness and angle, has no dark ring at
     grazing angles, and becomes more saturated as roughness increases. It is reciprocal and is sampled by a mixture of a
     clipped linearly transformed cosine and uniform directions (sec. 4 of the paper).
     """

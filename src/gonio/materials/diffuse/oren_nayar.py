@@ -20,7 +20,7 @@ class OrenNayar(BSDF):
 
     f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b))
     a = max(theta_o, theta_i),  b = min(theta_o, theta_i)
-    A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eq. 2 and 3)
+    A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eqs. 2 and 3)
 
     No trigonometric functions are evaluated: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i),
     and the product of the two sines and the cosine of the azimuth difference is the dot product of the tangential

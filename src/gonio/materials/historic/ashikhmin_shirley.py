@@ -27,12 +27,15 @@ class AshikhminShirley(_Glossy):
     of the paper, which excludes the fraction F0 of the light and decreases toward grazing angles. The model is
     reciprocal.
 
-    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
 
-    specular: Colour = spectrum(default=1.0, doc="scale factor of the lobe", low=0.0)
+    specular: Colour = spectrum(default=1.0, doc="scale factor for the lobe", low=0.0)
     exponent: Width = width(
-        default=100.0, doc="exponent of the lobe; for anisotropy, a pair along x and y", low=0.0, high=math.inf
+        default=100.0,
+        doc="exponent of the lobe; for anisotropy, exponents along x and y",
+        low=0.0,
+        high=math.inf,
     )
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
@@ -110,7 +113,7 @@ def _faded(cos: Scalar) -> Scalar:
 @function
 def _half_vector(u1: Scalar, u2: Scalar, exponent: Pair) -> Direction:
     """A half vector with density p. Its azimuth is given by tan phi = sqrt((n_x + 1) / (n_y + 1)) tan(2 pi u2), and its
-    polar angle follows the power lobe at that azimuth (Ashikhmin2000, eq. 9 and 10, for all four quadrants at once)."""
+    polar angle follows the power lobe at that azimuth (Ashikhmin2000, eqs. 9 and 10, for all quadrants at once)."""
     s, c = sincos((2.0 * ops.pi) * u2)
     across = s * sqrt((exponent.x + 1.0) / (exponent.y + 1.0))
     over = ops.rsqrt(sqr(c) + sqr(across))

@@ -28,12 +28,15 @@ class CookTorrance(_Glossy):
     reflectance F0, set eta to (1 + sqrt(F0)) / (1 - sqrt(F0)). The model is reciprocal. It is sampled by the visible
     normals of Beckmann's distribution with Smith masking.
 
-    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
 
-    specular: Colour = spectrum(default=0.25, doc="scale factor of the lobe; 1/4 for a real surface", low=0.0)
+    specular: Colour = spectrum(default=0.25, doc="scale factor for the lobe; 1/4 for a real surface", low=0.0)
     alpha: Width = width(
-        default=0.15, doc="width of the distribution; for anisotropy, a pair along x and y", low=1e-3, high=4.0
+        default=0.15,
+        doc="width of the distribution; for anisotropy, widths along x and y",
+        low=1e-3,
+        high=4.0,
     )
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)

@@ -58,10 +58,10 @@ class HeTorrance(_Glossy):
     model is reciprocal. Lengths are in nm, but only their ratios matter. The model is sampled by the visible normals of
     GGX with the width of the lobe at its peak.
 
-    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
 
-    specular: Colour = spectrum(default=1.0, doc="scale factor of the lobe", low=0.0)
+    specular: Colour = spectrum(default=1.0, doc="scale factor for the lobe", low=0.0)
     sigma: Number = number(default=180.0, doc="standard deviation of the heights", low=1.0, unit="nm")
     tau: Number = number(default=3000.0, doc="correlation length of the heights", low=100.0, unit="nm")
     eta: Number = number(default=1.5, doc="refractive index, relative to the outside", low=1.0)
@@ -89,7 +89,7 @@ class HeTorrance(_Glossy):
 
     @function
     def _shadowing(self, v: Direction) -> Scalar:
-        """S of one direction (He1991, eq. 24 and 25, with the exponential)."""
+        """S of one direction (He1991, eqs. 24 and 25, with the exponential)."""
         width = self._width()
         return distribution("beckmann").G1(v, vec2(width, width)) * (0.5 + 0.5 * erf(_cot(v) / width))
 
@@ -101,7 +101,7 @@ class HeTorrance(_Glossy):
 
     @function
     def _roughness2(self, x: Scalar) -> Scalar:
-        """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eq. 80 to 82). An estimate of w within a few percent is
+        """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eqs. 80 to 82). An estimate of w within a few percent is
         refined to rounding error by Newton steps for w = x^2 e^-w."""
         x2 = sqr(x)
         log_x = log(1.0 + x2)

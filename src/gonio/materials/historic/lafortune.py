@@ -28,7 +28,7 @@ class Lafortune(_Glossy):
     retro-reflection. The largest |C| should be 1, as in the normalization of Ngan2005, because the lobe scales with its
     n-th power. The model is reciprocal. It is sampled by a power lobe about (cx o_x, cy o_y, cz o_z).
 
-    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
 
     specular: Colour = spectrum(default=0.2, doc="albedo of the lobe for C = (-1, -1, 1), at normal incidence", low=0.0)

@@ -24,10 +24,10 @@ class LowMicrofacet(_Glossy):
     D = (1 + b (1 - n.h))^-c is not normalized, so `specular` includes the height of the peak of D. G is that of
     V-grooves, and the factor 1 / pi is that of Cook1982. The model is reciprocal. It is sampled by the power law of D.
 
-    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
 
-    specular: Colour = spectrum(default=3.0, doc="scale factor of the lobe, including the height of D", low=0.0)
+    specular: Colour = spectrum(default=3.0, doc="scale factor for the lobe, including the height of D", low=0.0)
     b: Number = number(default=300.0, doc="narrowness of the peak, which extends to 1 - n.h = 1 / b", low=1e-3)
     c: Number = number(default=1.5, doc="exponent of the falloff beyond the peak, (1 - n.h)^-c", low=0.0)
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)

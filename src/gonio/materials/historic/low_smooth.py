@@ -44,7 +44,7 @@ class LowSmooth(_Glossy):
     The model is reciprocal. `specular` is not an albedo but the height of the peak divided by F, in 1/sr. The model is
     sampled by the power law of the lobe, truncated near the rim of the disk of projected directions.
 
-    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
 
     specular: Colour = spectrum(default=10.0, doc="height of the peak divided by F, in 1/sr", low=0.0)

@@ -50,15 +50,15 @@ class ShiftedGamma(_Glossy):
     negative at the horizon. The model is reciprocal. It is sampled for the smallest and the largest alpha of the
     channels, by a power law and an exponential that together approximate D to within a factor of e.
 
-    The presets are the fits of Bagher2012 to the materials of the MERL database.
+    The presets are the fits of Bagher2012 to the materials in the MERL database.
     """
 
-    specular: Colour = spectrum(default=0.3, doc="scale factor of the lobe", low=0.0)
+    specular: Colour = spectrum(default=0.3, doc="scale factor for the lobe", low=0.0)
     alpha: Colour = spectrum(default=0.05, doc="width of the distribution, as a scale of tan^2 h", low=1e-5)
     p: Colour = spectrum(default=0.5, doc="exponent of x in D, which shapes the peak", low=0.0, high=3.0)
     f0: Colour = spectrum(default=0.05, doc="F at normal incidence, before f1 is subtracted")
     f1: Colour = spectrum(default=0.0, doc="coefficient of the cosine that is subtracted from F")
-    normalization: Colour = spectrum(default=17.5, doc="scale factor of D (K in the paper)", low=0.0)
+    normalization: Colour = spectrum(default=17.5, doc="scale factor for D (K in the paper)", low=0.0)
     Lambda: Colour = spectrum(default=3.0, doc="strength of the masking", low=0.0)
     reach: Colour = spectrum(default=1.64, doc="angle beyond theta0 at which masking is strong", low=0.05, unit="rad")
     k: Colour = spectrum(default=30.0, doc="steepness of the masking", low=1.0)

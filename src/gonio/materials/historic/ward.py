@@ -18,16 +18,16 @@ class Ward(_Glossy):
     """Ward's Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
 
     e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), where h is the half vector (Walter2005). The model is
-    reciprocal. The albedo of a narrow lobe is specular cos theta_o, so energy is lost toward grazing angles; the albedo
-    of a wide lobe, which extends toward the normal, grows without bound there. The model is sampled by half vectors
-    with density D (n.h), where D is Beckmann's distribution.
+    reciprocal. The albedo of a narrow lobe is specular cos theta_o, so energy is lost toward grazing angles. A wide
+    lobe extends toward the normal, and its albedo grows without bound at grazing angles. The model is sampled by
+    drawing half vectors with density D (n.h), where D is Beckmann's distribution.
 
-    The presets, named MATERIAL:PAPER/FIT, are published fits to materials of the MERL database.
+    The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
 
     specular: Colour = spectrum(default=0.2, doc="albedo of the lobe at normal incidence", low=0.0)
     alpha: Width = width(
-        default=0.15, doc="width of the Gaussian; for anisotropy, a pair along x and y", low=1e-3, high=4.0
+        default=0.15, doc="width of the Gaussian; for anisotropy, widths along x and y", low=1e-3, high=4.0
     )
     rotation: Angle = microfacet.rotation_angle()
 

@@ -52,7 +52,7 @@ class _OpenPBR(BSDF):
 
     masking: ClassVar[str] = "smith-correlated"
 
-    base_weight: Number = number(default=1.0, doc="scale factor of `base_color`", low=0.0, high=1.0)
+    base_weight: Number = number(default=1.0, doc="scale factor for `base_color`", low=0.0, high=1.0)
     base_color: Colour = spectrum(
         default=0.8, doc="diffuse color; for metal, the color at normal incidence", low=0.0, high=1.0
     )
@@ -63,7 +63,7 @@ class _OpenPBR(BSDF):
         default=0.0, doc="fraction of the surface that is metal", low=0.0, high=1.0, off=0.0
     )
     specular_weight: Number = number(
-        default=1.0, doc="scale factor of F0 for the dielectric and of F for metal", low=0.0, high=4.0
+        default=1.0, doc="scale factor for F0 for the dielectric and of F for metal", low=0.0, high=4.0
     )
     specular_color: Colour = spectrum(
         default=1.0, doc="tint of the reflection from outside; for metal, the tint at the edge", low=0.0, high=1.0
@@ -110,7 +110,7 @@ class _OpenPBR(BSDF):
         default=1.0, doc="mean free path; values other than 0 are treated as 0, with a warning", low=0.0, inside=True
     )
     subsurface_radius_scale: Colour = spectrum(
-        default=(1.0, 0.5, 0.25), doc="scale factor of `subsurface_radius` for each channel", low=0.0, inside=True
+        default=(1.0, 0.5, 0.25), doc="scale factor for `subsurface_radius` for each channel", low=0.0, inside=True
     )
     subsurface_scatter_anisotropy: Number = number(
         default=0.0, doc="for a thin wall: 1 scatters all light forward, -1 all light backward", low=-1.0, high=1.0
@@ -130,7 +130,7 @@ class _OpenPBR(BSDF):
         default=1.0, doc="strength of the darkening by interreflection under the coat", low=0.0, high=1.0
     )
     fuzz_weight: Number = number(default=0.0, doc="fraction of the surface under fuzz", low=0.0, high=1.0, off=0.0)
-    fuzz_color: Colour = spectrum(default=1.0, doc="scale factor of the light scattered by the fuzz", low=0.0, high=1.0)
+    fuzz_color: Colour = spectrum(default=1.0, doc="scale factor for light scattered by the fuzz", low=0.0, high=1.0)
     fuzz_roughness: Number = number(
         default=0.5, doc="roughness of the fuzz: 0 for fibers along the normal, 1 for dust", low=0.0, high=1.0
     )

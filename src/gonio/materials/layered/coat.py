@@ -54,7 +54,7 @@ class Coat(BSDF):
     directions; and 1 / eta^2, with eta = `index`, accounts for the change of solid angle. Light that bounces more than
     once is represented by a factor g on the lobe of the base and by the separable lobe rest(o) rest(i) / norm (see
     `interior.py`). This is exact over a Lambertian base; over a metal, the albedo of each channel is exact. The model
-    is reciprocal, and a clear coat on a white base conserves all light.
+    is reciprocal, and a clear coat on a white base loses no light.
 
     With `bounces="white"`, g and rest are those of a white base: the coated material reflects R plus (1 - R) times the
     color of the base, which therefore becomes neither darker nor more saturated.

@@ -29,8 +29,8 @@ class OpenPBR(_OpenPBR):
     is the color of the coat for the two crossings, along wo and wi, and D is the darkening by interreflection under the
     coat. W is the transmittance of the coat's surface for both crossings. Depending on `layering`, it is
     1 - E_coat(wo), as in the specification's reduction of layers to lobes, or a product of one factor per direction,
-    which conserves all light of a white base (docs/openpbr.md). f_diffuse is `eon`, f_fuzz is `sheen`, metal is F82
-    with multiple scattering, and glass is `dielectric` with multiple scattering.
+    which loses no light over a white base (docs/openpbr.md). f_diffuse is `eon`, f_fuzz is `sheen`, metal is F82 with
+    multiple scattering, and glass is `dielectric` with multiple scattering.
 
     The parameters are those of the specification. A base or coat with a roughness below 0.01 is a mirror. Refractive
     indices range from 1 to 5. Subsurface scattering is local. With `geometry_thin_walled`, it follows the

@@ -17,7 +17,7 @@ from .reflector import _Reflector
 
 
 class Conductor(_Reflector):
-    """A rough metal: f = albedo F D G / (4 (n.o)(n.i)) (Torrance1967; course sheet, eq. 4 to 11).
+    """A rough metal: f = albedo F D G / (4 (n.o)(n.i)) (Torrance1967; course sheet, eqs. 4 to 11).
 
     F is evaluated at the half vector. D, G and F are selected by `ndf`, `masking` and `fresnel`. If alpha is below
     1e-4, the surface is a perfect mirror. Multiply scattered light is lost; at alpha = 1, this is more than half of the
@@ -31,7 +31,7 @@ class Conductor(_Reflector):
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
     fresnel: Member = microfacet.fresnel_choice()
-    albedo: Colour = microfacet.albedo_factor("scale factor of all reflected light")
+    albedo: Colour = microfacet.albedo_factor("scale factor for all reflected light")
     sampling: str = microfacet.sampling_choice()
 
     preset_kind: ClassVar[str] = "metal"

@@ -66,7 +66,7 @@ class Dielectric(microfacet._Microfacet):
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
     fresnel: Member = microfacet.fresnel_choice()
-    albedo: Colour = microfacet.albedo_factor("scale factor of all reflected and transmitted light")
+    albedo: Colour = microfacet.albedo_factor("scale factor for all reflected and transmitted light")
     transmission: bool = flag(default=True, doc="whether refracted light is transmitted; otherwise it is lost")
     sampling: str = microfacet.sampling_choice()
     absorption: Colour = spectrum(

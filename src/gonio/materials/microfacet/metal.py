@@ -41,7 +41,7 @@ class Metal(_Reflector):
     ndf: Member = microfacet.ndf_choice()
     masking: Member = microfacet.masking_choice()
     fresnel: str = choice("f82", "Fresnel reflectance", FRESNELS, white="one")
-    albedo: Colour = microfacet.albedo_factor("scale factor of all reflected light")
+    albedo: Colour = microfacet.albedo_factor("scale factor for all reflected light")
     sampling: str = microfacet.sampling_choice()
 
     @function

@@ -37,7 +37,7 @@ class Terms(NamedTuple):
 
 def alpha_width() -> Width:
     """Declare the width of the microfacet distribution."""
-    return width(default=0.1, doc="width of the microfacet distribution; for anisotropy, a pair along x and y")
+    return width(default=0.1, doc="width of the microfacet distribution; for anisotropy, widths along x and y")
 
 
 def rotation_angle() -> Angle:
@@ -69,7 +69,7 @@ def sampling_choice() -> str:
 
 
 def albedo_factor(doc: str) -> Colour:
-    """Declare the scale factor of all scattered light, with a given documentation."""
+    """Declare the scale factor for all scattered light, with a given documentation."""
     return spectrum(default=1.0, doc=doc, low=0.0, high=1.0, soft_high=True)
 
 
@@ -163,7 +163,7 @@ def sample_normal(model: _Microfacet, wo: Direction, u1: Scalar, u2: Scalar, alp
 
 @function
 def pdf_per_cosine(model: _Microfacet, wo: Direction, m: Direction, alpha: Pair) -> Scalar:
-    """Density of `sample_normal` divided by |o.m|, 1/sr; the cosine cancels in dm/dwi (Walter2007, eq. 14 and 17)."""
+    """Density of `sample_normal` divided by |o.m|, 1/sr; the cosine cancels in dm/dwi (Walter2007, eqs. 14 and 17)."""
     ndf = distribution(model.ndf)
     if model.sampling == "normals":
         return safe_div(ndf.pdf(m, alpha), abs(dot(wo, m)))

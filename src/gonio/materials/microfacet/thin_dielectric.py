@@ -54,7 +54,7 @@ class ThinDielectric(BSDF):
     eta: Number = number(default=1.5, doc="refractive index of the sheet, relative to the outside", low=0.2, high=5.0)
     fresnel: Member = microfacet.fresnel_choice()
     bounces: str = choice("polarized", "how the bounces inside the sheet are summed", BOUNCES)
-    albedo: Colour = microfacet.albedo_factor("scale factor of all reflected and transmitted light")
+    albedo: Colour = microfacet.albedo_factor("scale factor for all reflected and transmitted light")
 
     preset_kind: ClassVar[str] = "medium"
 

@@ -46,7 +46,7 @@ class Sheen(BSDF):
     interpolated linearly.
     """
 
-    albedo: Colour = spectrum(default=1.0, doc="scale factor of all reflected light", low=0.0, high=1.0, soft_high=True)
+    albedo: Colour = spectrum(default=1.0, doc="scale factor for reflected light", low=0.0, high=1.0, soft_high=True)
     roughness: Number = number(
         default=0.5,
         doc="square root of the flakes' cross section: 0 for fibers along the normal, 1 for random directions",

@@ -34,7 +34,7 @@ class SheenCharlie(BSDF):
     light than it receives near the horizon. It is sampled by a guide, a density tabulated from `eval`.
     """
 
-    albedo: Colour = spectrum(default=1.0, doc="scale factor of all reflected light", low=0.0, high=1.0, soft_high=True)
+    albedo: Colour = spectrum(default=1.0, doc="scale factor for reflected light", low=0.0, high=1.0, soft_high=True)
     alpha: Number = number(default=0.3, doc="spread of the microfacet normals about the horizon", low=0.01, high=1.0)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {

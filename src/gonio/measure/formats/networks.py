@@ -1,4 +1,4 @@
-"""Small neural networks that represent materials of the MERL database (Sztrajman2021)."""
+"""Small neural networks that represent materials in the MERL database (Sztrajman2021)."""
 
 from __future__ import annotations
 

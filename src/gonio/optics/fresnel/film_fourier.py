@@ -44,7 +44,7 @@ WHITE = (0.95047, 1.0, 1.08883)  # XYZ of D65: the curves were fitted for an equ
 
 @function
 def in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar) -> Spectrum:
-    """The RGB color of the reflectance of a thin film, computed in Fourier space (Belcour2017, eq. 6 to 10).
+    """The RGB color of the reflectance of a thin film, computed in Fourier space (Belcour2017, eqs. 6 to 10).
 
     It is the sum of two terms. The mean of the reflectance over all phases is computed for each RGB channel. The
     interference term is computed for the color-matching functions x, y and z, with the index of the base in red, green

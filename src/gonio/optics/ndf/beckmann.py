@@ -66,11 +66,12 @@ class Beckmann(Stretched):
 
     @function
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
-        """Visible slopes of the unit Gaussian (Heitz2014b, sec. 3 and 5).
+        """Sample the visible slopes of a Gaussian of unit width (Heitz2014b, secs. 3 and 5).
 
-        Along v, the slope x has the cumulative distribution c(x) ~ (1 + erf x) / 2 + tan exp(-x^2) / (2 sqrt(pi)) up to
-        x = cot. Two steps from an initial guess, the first in b = erf x, invert it with an error of 5e-8 (Jakob2014).
-        Across v, the slope is Gaussian.
+        Along v, the slope x <= cot theta has the cumulative distribution, up to a factor,
+        c(x) = (1 + erf x) / 2 + tan theta exp(-x^2) / (2 sqrt(pi)). It is inverted from an initial guess by a
+        Halley step in b = erf x and a Newton step in x, with an error of 5e-8 (Jakob2014). Perpendicular to v, the
+        slope is Gaussian.
         """
         sin_v, cos_v = sqrt(sin2(v)), maximum(v.z, 1e-6)
         tan_v = sin_v / cos_v

@@ -59,7 +59,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
             # an exception or a timeout; the same one in several laws counts as one failure
             first = faults.setdefault(re.sub(r"\d+", "", verdict.why[0]), law.name)
             if first != law.name:
-                verdict.cause = f"follows from the failure of the law {first}"
+                verdict.cause = f"a consequence of the failure of the {first} law"
             continue
         if verdict.status == DECLARED and effort.name == "quick":
             continue  # a quick check spends no time on declared violations
@@ -90,7 +90,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
         if verdict.grade not in (None, Grade.INVISIBLE, Grade.NOISE, Grade.INTERFACE):
             visible.add(law.name)
         if leader is not None:
-            verdict.cause = f"follows from the failure of the law {leader}"
+            verdict.cause = f"a consequence of the failure of the {leader} law"
         elif cause is not None:
             # rounding that is invisible in pictures does not explain visible failures
             aside = law.name == "precision" and verdict.grade in (None, Grade.INVISIBLE) and visible

@@ -59,7 +59,7 @@ class Calls(Law):
         if worst.share > 0.0:
             return severity.Bias(min(worst.worst, 1.0), min(worst.share, 1.0), 0.0, f"check: {worst.what}", "bias")
         names = ", ".join(dict.fromkeys(answer.what for answer in wrong))
-        return severity.Bias(0.0, 0.0, 0.0, f"only renderers that use the following are affected: {names}", "interface")
+        return severity.Bias(0.0, 0.0, 0.0, f"only renderers that use {names} are affected", "interface")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
         wrong: list[Answer] = finding.details  # type: ignore[assignment]
@@ -68,7 +68,7 @@ class Calls(Law):
                 name, other, wo, wi, got, all_rows = answer.rows
                 yield Ratio(name, other, wo, wi, got, all_rows, subject)
         for answer in wrong:
-            text = f"an interface error ({answer.what}), not an error of the formula: {answer.wrong}"
+            text = f"an interface error ({answer.what}), not an error in the formula: {answer.wrong}"
             words = SUSPECTS.get(answer.what, text)
             if answer.what == "declared properties":
                 guess = next((guess for start, guess in FACTS.items() if answer.wrong.startswith(start)), "")
