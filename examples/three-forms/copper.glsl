@@ -15,7 +15,7 @@
 // functions, 21 selections).
 //
 // wo points to the viewer, wi to the light: unit vectors of the local frame, away from the surface; +z is
-// the shading normal. Colors are linear RGB. Declare `precision highp float;` above: 16 bits are not enough.
+// the shading normal. Colors are linear RGB. Declare `precision highp float;` above: 16-bit floats are not sufficient.
 
 // The smallest normal float32 is 1.2e-38; its root, squared again, must not underflow in a quotient.
 const float TINY = 1.0e-30;

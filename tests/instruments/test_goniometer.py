@@ -263,7 +263,7 @@ def test_tables_without_gaps_hold_the_value_of_the_rim() -> None:
     f = values(found.table)[..., 0]
     rim = model.f([np.sin(np.radians(20.0)), 0.0, np.cos(np.radians(20.0))], [0.0, 0.0, 1.0], precision="float64")
     assert f[0, 1, 0] == pytest.approx(rim[0, 0], rel=1e-6)
-    assert any("rim" in note for note in found.notes)
+    assert any("--blocked angle" in note for note in found.notes)
 
 
 def test_a_blocked_direction_moves_to_the_rim_and_stays_above() -> None:

@@ -85,7 +85,7 @@ def test_a_finished_picture_goes_on_to_more_samples(scene: Path, tmp_path: Path)
         more = go.resume(tmp_path / "c", spp=9, output=tmp_path / "more.exr")
     assert np.array_equal(more, go.render(scene, spp=9))
     assert np.array_equal(images.read(tmp_path / "more.exr").pixels, more)
-    with pytest.raises(InputError, match="holds 9 samples per pixel, but 4 are requested"):
+    with pytest.raises(InputError, match="has 9 samples per pixel, but 4 are requested"):
         go.resume(tmp_path / "c", spp=4)
 
 

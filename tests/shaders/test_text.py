@@ -34,7 +34,7 @@ def test_names_docstrings_citations_and_constants_of_the_source_survive() -> Non
     assert "half a disk (Heitz2014, eq. 72)" in text
     assert {"GGX_D", "GGX_Lambda", "half_vector", "masking_shadowing", "Conductor_reflectance"} <= set(_functions(text))
     assert "float over = 1.0 / (alpha.x * alpha.y);" in text and "const float SMOOTH = 0.0001;" in text
-    assert "Below this width the tilt of facets" in text and "const float INV_PI = 0.31830987;" in text
+    assert "Below this width, the tilt of facets" in text and "const float INV_PI = 0.31830987;" in text
 
 
 @pytest.mark.parametrize("name", ["lafortune", "disney", "normal-map"])
@@ -262,7 +262,7 @@ def test_the_head_tells_how_to_call_it_and_structs_what_their_fields_are(lang: s
     own = "material" if lang == "wgsl" else "self"
     assert f"// KullaConty_eval({own}, derived, wo, wi)   the BSDF times |cos theta_i|, RGB, 1/sr" in head
     assert f"// KullaConty_derive({own})" in head and "KullaConty_terms" not in head
-    assert "not enough." in head or lang in ("glsl-vulkan", "osl")  # which have no precision of 16 bits
+    assert "not sufficient." in head or lang in ("glsl-vulkan", "osl")  # which have no precision of 16 bits
     assert re.search(r"base_k\b.*// imaginary part of the refractive index, relative to the outside; >= 0", text)
     assert "// width of the microfacet distribution; along x, along y; >= 0 and <= 1" in text
     assert re.search(r"pdf\b.*// density of wi, 1/sr", text)

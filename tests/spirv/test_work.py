@@ -31,7 +31,7 @@ def test_a_tree_of_calls_is_rejected_by_the_name_of_a_function(tmp_path: Path) -
         InputError, match=r"more than 250,000 instructions: [\d,]+ in [\d,]+ calls of 'level\d+'"
     ) as caught:
         go.Shader(str(file))
-    assert caught.value.where.startswith("a.wgsl:") and "use it again" in caught.value.hint
+    assert caught.value.where.startswith("a.wgsl:") and "reuse it" in caught.value.hint
     assert time.thread_time() - start < 20.0
 
 

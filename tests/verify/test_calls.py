@@ -95,7 +95,7 @@ def test_a_plugin_in_a_file_is_judged_by_what_path_tracers_call(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("right", "wrong", "words"),
     [
-        ("& active & asked, dr.inv_pi * wo.z", "& active & asked, dr.inv_pi * si.to_local(wo).z", "pdf on a tilted"),
+        ("& active & asked, dr.inv_pi * wo.z", "& active & asked, dr.inv_pi * si.to_local(wo).z", "pdf on a rotated"),
         ("mi.Color3f(0.5), mi.Color3f(0))", "mi.Color3f(si.uv.x), mi.Color3f(0))", "eval with other si.uv"),
     ],
 )

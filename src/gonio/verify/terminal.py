@@ -9,7 +9,7 @@ import numpy as np
 from . import directions
 from .forensics import diagnosis
 from .subject import Fault, Subject
-from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, NOT_TRIED, PASS, TOLERATED, Card, Verdict
+from .verdict import CONSEQUENCE, DECLARED, FAIL, KNOWN, NOT_APPLICABLE, NOT_TRIED, PASS, TOLERATED, Card, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,7 +49,9 @@ def show_card(card: Card, console: Console) -> None:
         console.print(f"[dim]{escape(line)}[/]")
     console.print()
     ordered = diagnosis.in_order(card.verdicts)
-    same = [v for v in ordered if v.figure is None and v.cause.startswith("follows")]  # the exception is another law's
+    same = [
+        v for v in ordered if v.figure is None and v.cause.startswith(CONSEQUENCE)
+    ]  # the exception is another law's
     for v in ordered:
         if v not in same:
             _explain(v, console)

@@ -21,6 +21,7 @@ from .subject import Subject
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = ("pass", "fail", "breaks as declared", "does not apply")
 KNOWN = "known"  # a failure that the baseline already contains
+CONSEQUENCE = "a consequence of the failure"  # how the cause of a failure begins that follows from another failure
 NOT_TRIED = "not tried"  # a program or package that the law needs is not installed
 TOLERATED = "tolerated"  # a failure whose effect on pictures the user tolerates
 

@@ -26,7 +26,7 @@ class GLSL(Language):
     name = "glsl"
     title = "GLSL ES 3.00 (WebGL2)"
     suffix = ".glsl"
-    precision = "Declare `precision highp float;` above: 16 bits are not enough."
+    precision = "Declare `precision highp float;` above: 16-bit floats are not sufficient."
     words: ClassVar[Mapping[str, str]] = {
         **Language.words,
         "atan2": "atan({0}, {1})",

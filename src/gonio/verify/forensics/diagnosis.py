@@ -17,7 +17,7 @@ from ..isolation.watch import limited
 from ..laws import Law
 from ..severity import Grade
 from ..subject import Fault, Subject
-from ..verdict import DECLARED, FAIL, Finding, Verdict
+from ..verdict import CONSEQUENCE, DECLARED, FAIL, Finding, Verdict
 from . import causes, reproduction
 from .ratio import Cause, Ratio
 
@@ -59,7 +59,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
             # an exception or a timeout; the same one in several laws counts as one failure
             first = faults.setdefault(re.sub(r"\d+", "", verdict.why[0]), law.name)
             if first != law.name:
-                verdict.cause = f"a consequence of the failure of the {first} law"
+                verdict.cause = f"{CONSEQUENCE} of the {first} law"
             continue
         if verdict.status == DECLARED and effort.name == "quick":
             continue  # a quick check spends no time on declared violations
@@ -90,7 +90,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
         if verdict.grade not in (None, Grade.INVISIBLE, Grade.NOISE, Grade.INTERFACE):
             visible.add(law.name)
         if leader is not None:
-            verdict.cause = f"a consequence of the failure of the {leader} law"
+            verdict.cause = f"{CONSEQUENCE} of the {leader} law"
         elif cause is not None:
             # rounding that is invisible in pictures does not explain visible failures
             aside = law.name == "precision" and verdict.grade in (None, Grade.INVISIBLE) and visible
