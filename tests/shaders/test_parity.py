@@ -23,8 +23,9 @@ RUN = {"glsl": parity.run_glsl, "wgsl": parity.run_wgsl}
 
 # a sampled direction is found by Newton's method in float32 (Beckmann), or on a grazing pair sees its facet from behind
 SAMPLED = 3e-4
-# and the waves of a film magnify what rounding has done to the facet between two directions, most at grazing angles
-FRINGES = 3e-4
+# and the waves of a film magnify what rounding has done to the facet between two directions, most at grazing angles and
+# at the critical angle of a bubble
+FRINGES = 4e-4
 
 # a guide's density near the rim of its chart, where the logarithm of the distance from the axis is rounded: 3 times
 GUIDED = 6.0
