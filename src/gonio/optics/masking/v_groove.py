@@ -23,7 +23,9 @@ class VGroove(Masking):
     def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """max(0, G1(wo) + G1(wi) - 1): the top of a facet is visible from one direction, its bottom from the other
         (Heitz2014b)."""
-        return maximum(_visible_fraction(wo, m) + _visible_fraction(wi, m) - 1.0, 0.0)
+        a, b = _visible_fraction(wo, m), _visible_fraction(wi, m)
+        # subtracted in this order, since the smaller one would lose its digits in a sum with 1
+        return maximum(minimum(a, b) - (1.0 - maximum(a, b)), 0.0)
 
 
 @function
