@@ -19,7 +19,7 @@ COURSE = ROOT / "docs" / "course"
 ENGLISH = sorted(page for page in COURSE.glob("*.md") if not page.name.endswith(".zh.md"))
 PAGES = [page for page in ENGLISH if page.stem != "README"]
 PARTS = {
-    ".md": ("**Question.**", "## Derivation", "## Run it", "![", "**What to look for.**", "## Check your own"),
+    ".md": ("**Question.**", "## Derivation", "## Run it", "![", "**What to look for.**", "## Check your own code"),
     ".zh.md": ("**问题。**", "## 推导", "## 运行", "![", "**看点。**", "## 检查自己的结果"),
 }
 STEP = re.compile(r"^```python ([\w.]+)\n(.*?)^```$|^    (gonio [^\n]*)$", re.DOTALL | re.MULTILINE)

@@ -14,6 +14,7 @@ import pytest
 from gonio.bridge import engine
 from gonio.errors import InputError
 from gonio.pictures import images
+from gonio.render import request_json
 from gonio.render.prepare import prepare
 from gonio.render.request import Request
 from gonio.transport import integrators
@@ -123,6 +124,27 @@ def test_names_are_taken_once(registered: dict[str, type]) -> None:
 
     with pytest.raises(InputError, match="the integrator 'path' already exists"):
         integrators.Integrator.family.add(Another)
+
+
+def test_a_file_brings_one_without_being_installed(scene: Path, tmp_path: Path) -> None:
+    scene.write_text(json.dumps({**SCENE, "integrator": {"type": "normal"}}))
+    file = tmp_path / "files" / "ao.py"
+    file.parent.mkdir()
+    file.write_text(OCCLUSION.replace("strangersOcclusion", "ambient_of_a_file"))
+    try:
+        assert np.all(_picture(scene, integrator=f"{file}:Occlusion", spp=4) == 1.0)
+        with pytest.raises(InputError, match="no class 'Occlude'") as refused:
+            _picture(scene, integrator=f"{file}:Occlude", spp=4)
+        assert "Occlusion" in refused.value.hint
+    finally:
+        integrators.Integrator.family.remove("ambient_of_a_file")
+
+
+def test_a_checkpoint_runs_no_file_without_permission(scene: Path, tmp_path: Path) -> None:
+    facts = request_json.described(Request(scene, integrator="ao.py:Occlusion"))
+    with pytest.raises(InputError, match="Python files"):
+        request_json.request_of(facts, "a.checkpoint", allow_code=False)
+    assert request_json.request_of(facts, "a.checkpoint", allow_code=True).integrator == "ao.py:Occlusion"
 
 
 @pytest.mark.slow

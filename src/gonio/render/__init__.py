@@ -40,7 +40,7 @@ def render(
     output         file to write: .exr, .hdr, .png or .npz; None writes no file
     spp            samples per pixel
     size           width and height of the film, pixels
-    integrator     "direct", "path", "caustics", "light", "whitted", "normal", ...
+    integrator     "direct", "path", "caustics", "light", "whitted", "normal", ..., or a class, "ao.py:Occlusion"
     max_depth      maximum path length in segments, for the integrators "path", "caustics" and "light"
     sampler        source of the random numbers, such as "sobol"
     seed           seed of the random numbers; equal seeds give bit-identical pictures

@@ -26,7 +26,9 @@ class RenderOptions:
 
     spp: Annotated[int | None, Shown("N", "Samples per pixel.")] = None
     size: Annotated[tuple[int, int] | None, Shown("WxH", "Film size in pixels, such as 640x480.")] = None
-    integrator: Annotated[str | None, Shown("NAME", "Integrator: direct, path, caustics, light, normal, ...")] = None
+    integrator: Annotated[
+        str | None, Shown("NAME", "Integrator: direct, path, caustics, light, normal, ... or FILE.py:CLASS.")
+    ] = None
     max_depth: Annotated[
         int | None, Shown("N", "Maximum path length, for the integrators path, caustics and light.")
     ] = None

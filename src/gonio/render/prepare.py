@@ -14,6 +14,7 @@ from .. import garbage
 from .._version import __version__
 from ..bridge import engine
 from ..errors import InputError, did_you_mean
+from ..material import user_code
 from ..pictures import denoise, images
 from ..scene import mitsuba_scene
 from ..scene.film_size import check_film
@@ -176,11 +177,14 @@ def _settings(scene: Settings, request: Request) -> Settings:
     """The settings of the scene, overridden by those of the request."""
     from ..transport.integrators.base import Integrator, check_sampler
 
-    if request.integrator is not None:
-        Integrator.family.get(request.integrator, "--integrator")
+    chosen = request.integrator
+    if chosen is not None and user_code.names_code(chosen):
+        chosen = user_code.member(chosen, where="--integrator", family=Integrator.family)
+    if chosen is not None:
+        Integrator.family.get(chosen, "--integrator")
     if request.sampler is not None:
         check_sampler(request.sampler, "--sampler")
-    integrator = request.integrator or scene.integrator
+    integrator = chosen or scene.integrator
     if request.max_depth is not None and not (family := Integrator.family).get(integrator).takes_depth:
         deep = ", ".join(name for name, member in family.all().items() if member.takes_depth)
         what = f"integrator '{integrator}' has no maximum depth"

@@ -42,7 +42,7 @@ _SPHERE_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
-    """Build the `mi.Scene` of a description: shapes `shape0`, ..., lights `light0`, ..., and `sensor` with its film.
+    """Build an `mi.Scene` from a description: shapes `shape0`, ..., lights `light0`, ..., and `sensor` with its film.
 
     Shapes with equal materials share one BSDF. Raises InputError for an unusable image or mesh.
     """

@@ -46,14 +46,16 @@ class Page:
         lines += ["| parameter | kind | range | unit | default | meaning |", "|---|---|---|---|---|---|"]
         for row in self.parameters:
             default = row.default if row.default == "required" else f"`{row.default}`"
-            allowed = "<br>".join(f"`{key}`: {text}" for key, text in row.choices.items()) or row.range
+            allowed = (
+                "<br>".join(f"`{key}`: {text[:1].upper()}{text[1:]}" for key, text in row.choices.items()) or row.range
+            )
             lines.append(f"| `{row.name}` | {row.kind} | {allowed} | {row.unit or '-'} | {default} | {row.doc} |")
         for law, reason in self.breaks.items():
             lines += ["", f"By design, this model violates the **{law}** law: {reason}."]
         if self.presets:
             named = ", ".join(f"`{name}`{_also(name, title)}" for name, title in self.presets.items())
             lines += ["", f"Presets: {named}."]
-        return "\n".join([*lines, "", f"Mitsuba plugin `{self.plugin}`. Source: `{self.source}`.", ""])
+        return "\n".join([*lines, "", f"Mitsuba plugin: `{self.plugin}`. Source: `{self.source}`.", ""])
 
     def text(self, width: int = _WIDTH) -> str:
         """The page for a terminal with `width` columns."""

@@ -41,7 +41,7 @@ class Target:
         return {name: values.reshape(*shape, *values.shape[1:]) for name, values in tables.items()}
 
     def at(self, points: Points, fine: bool) -> dict[str, np.ndarray]:
-        """`exact` in a single part."""
+        """Evaluate `exact` in one pass, without splitting the input."""
         judge = quadrature.JUDGE if points.alpha_y is None else quadrature.TURNED_JUDGE
         nodes = judge if fine else None
         if self.model is None:

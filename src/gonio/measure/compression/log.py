@@ -30,7 +30,8 @@ C = TypeVar("C", LogTable, LowRank, LogAdaptive)
 
 
 class Log(Method):
-    """log: cosine coefficients of the logarithms, rounded to multiples of the smallest step that the size allows."""
+    """log: cosine-series coefficients of the logarithms of the values, quantized with the smallest step that fits the
+    size."""
 
     name: ClassVar[str] = "log"
 

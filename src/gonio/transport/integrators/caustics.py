@@ -145,8 +145,8 @@ class Caustics(Path):
         if self.retraces:
             u.lobe = state.retrace.lobe(u.lobe)
         light = self.sample_light(vertex, u, active)
-        light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
-        gathered = self.direct_light(vertex, light, light_value, light_pdf, active)
+        value, bsdf_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
+        gathered = self.direct_light(vertex, light, value, bsdf_pdf, active)
 
         # The light from particles, weighted by MIS with paths that continue through mirrors
         photons, excess, counts = self.gather_photons(state, vertex, u, active)

@@ -38,8 +38,8 @@ class Direct(LightTransport):
         # Light sampling; the same call of the BSDF also samples a direction.
         u = self.numbers(path, key)
         light = self.sample_light(vertex, u, active) if self.samples_lights else None
-        light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
-        radiance = radiance + throughput * self.direct_light(vertex, light, light_value, light_pdf, active)
+        value, bsdf_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
+        radiance = radiance + throughput * self.direct_light(vertex, light, value, bsdf_pdf, active)
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(vertex, active)
 

@@ -8,10 +8,11 @@
     direct_light  the light from the lamp, weighted by MIS with BSDF sampling, if the shadow ray is not blocked
     spawn         the ray in the next direction
     roulette      Russian roulette
-    trace         the first hit of this ray
+    trace         the first hit of this ray; for the last ray, `light_along` adds its light instead
 
-At each vertex, the BSDF is called once, to evaluate it toward a light and to sample the next direction. A shadow ray is
-traced unless the contribution of the light is zero.
+A path ends at the maximum depth, if its throughput is 0, by roulette, or if its ray hits nothing. At each vertex, the
+BSDF is called once, to evaluate it toward a light and to sample the next direction. A shadow ray is traced unless the
+contribution of the light is zero.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ from ..scattering import Vertex, keep_hero
 from ..scene_data import SceneData
 from .base import Integrator, Settings
 
-# Russian roulette begins at this depth, as in Mitsuba's `path`, because the throughput is rarely low enough before.
+# Russian roulette begins at this depth, as in Mitsuba's `path`, because the throughput is rarely low enough before. At
+# the default maximum depth of 5, it is never played.
 ROULETTE_DEPTH = 5
 # The ratio of the survival probability to the throughput. Early termination increases the error too much: with a factor
 # of 1, the error is 1.3 times as large for rough glass, 1.2 times for a room and 1.08 times for a soft sky, in exchange
@@ -195,14 +197,14 @@ class LightTransport(Integrator):
         return value, pdf, bs, weight
 
     def direct_light(
-        self, vertex: Vertex, light: LightSample | None, value: Radiance, pdf: Float, active: Mask
+        self, vertex: Vertex, light: LightSample | None, value: Radiance, bsdf_pdf: Float, active: Mask
     ) -> Radiance:
         """The light of a light sample that is scattered back along the path, weighted by MIS with BSDF sampling."""
         if light is None:
             return self.mi.Spectrum(0)
         si, reflected = vertex.si, value * light.weight
         if self.samples_lobes:
-            reflected *= dr.select(light.delta, 1, self.lights.mis_weight(light.ds.pdf, pdf))
+            reflected *= dr.select(light.delta, 1, self.lights.mis_weight(light.ds.pdf, bsdf_pdf))
         if vertex.crossing is not None:
             side = vertex.side(si.to_local(light.ds.d))
             reflected *= self.media.transmitted(side, si, light.ds.dist) & vertex.crossing.surface

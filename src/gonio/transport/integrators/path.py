@@ -67,15 +67,15 @@ class Path(LightTransport):
         active = path.active & vertex.si.is_valid() & (path.depth + 1 < self.max_depth)
         throughput, hero_only = self.keep_hero(path, vertex, throughput, active)
 
-        # Light sampling; the same call of the BSDF also samples the next direction.
+        # Light sampling. `sample_bsdf` evaluates the BSDF toward the light and samples the next direction in one call.
         u = self.numbers(path, key)
         light = self.sample_light(vertex, u, active)
-        light_value, light_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
-        radiance = radiance + throughput * self.direct_light(vertex, light, light_value, light_pdf, active)
+        value, bsdf_pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
+        radiance = radiance + throughput * self.direct_light(vertex, light, value, bsdf_pdf, active)
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(vertex, active)
 
-        # BSDF sampling: the next ray. The next vertex adds the emission along it.
+        # The next ray, in the sampled direction. The next vertex adds the emission along it.
         throughput = throughput * weight
         features = self.data.features(throughput, vertex.si, path.active, active)
         path = replace(path, throughput=throughput, radiance=radiance, hero_only=hero_only)

@@ -89,7 +89,8 @@ def of_views(what: str, wo: np.ndarray, bad: np.ndarray, fault: str, transmits: 
     if first < STEEP:
         return Cause(words, f"{fault} {name}")
     guess = "; possible reason: total internal reflection" if transmits else ""
-    return Cause(f"{words}, {first:.3g} degrees or more from the normal{guess}", f"{fault} {name}")
+    where = f"{first:.3g} degrees or more from the normal" if first < 89.95 else "at grazing angles (90 degrees)"
+    return Cause(f"{words}, {where}{guess}", f"{fault} {name}")
 
 
 def _written(value: Any) -> str:

@@ -325,7 +325,7 @@ def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
     names = [axis for axis in names if "." not in axis.path and axis.kind == "float"]
     if not names:
         raise DoesNotApply("the material declares no `limits` and has no weight or thickness that can be 0")
-    figure, worst, row, value = 0.0, names[0].path, 0, 0.0
+    figure, worst, row = 0.0, names[0].path, 0
     for axis in names:
         try:
             off = subject.replace(**{axis.path: 0.0}).eval(wo, wi)
@@ -337,12 +337,12 @@ def _continuity(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> Finding:
         # a few pairs may lie on an edge of the model
         size = float(np.percentile(step.max(1), 90.0))
         if size > figure:
-            figure, worst, row, value = size, axis.path, int(np.argmax(step.max(1))), NEAR[1] * axis.high
+            figure, worst, row = size, axis.path, int(np.argmax(step.max(1)))
     return Finding(
         figure=figure,
         tolerance=1e-3,
         reason="the effect of a layer must vanish continuously",
-        worst=f"{worst} = {value:g} compared with 0: {pair_in_words(wo[row], wi[row])}",
+        worst=f"{worst} near 0 compared with {worst} = 0: {pair_in_words(wo[row], wi[row])}",
         at=(wo[row], wi[row]) if figure > 1e-3 else None,
         settings={worst: 0.0},
         notes=[

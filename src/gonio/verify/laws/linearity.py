@@ -53,10 +53,10 @@ class Linearity(Law):
             row, size = worst_of(relative(a, b, 0.0, 1e-9 * float(np.max(np.abs(b), initial=0.0))))
             if size > tolerance and case != label:
                 # for example if one layer attenuates another by its brightest channel
-                notes.append(f"eval is not linear in {label} between two colors: error {size:.2g}")
+                notes.append(f"between two colors, eval is nonlinear in {label} (error {size:.2g})")
                 continue
             if size > tolerance and label != "mix" and _bounces(subject, label, wo, wi, effort.full):
-                notes.append(f"{label} enters more than once, as in multiple reflections: nonlinearity {size:.2g}")
+                notes.append(f"eval is nonlinear in {label}, as expected for multiple reflections (error {size:.2g})")
                 continue
             if size > worst:
                 worst, place, name = size, row, case

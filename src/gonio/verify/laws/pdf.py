@@ -267,7 +267,7 @@ def _misses_the_middle(wo: np.ndarray, wi: np.ndarray, fine: np.ndarray) -> bool
 _KINDS = {
     "fine": "chi-square test",
     "coarse": "chi-square test with coarse cells",
-    "others": "binomial test of the samples outside all cells against 1 - (integral of the pdf)",
+    "others": "binomial test of the fraction of samples outside all histogram cells",
 }
 
 

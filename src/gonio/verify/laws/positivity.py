@@ -86,7 +86,7 @@ class Positivity(Law):
                     finding.figure += 1
                     text = f"the gradient of eval with respect to {name} is not finite"
                     fails(text, "", many_o[row], many_i[row], changes[row // len(wo)])
-        finding.shown = f"{finding.figure:g} of {checked:,.0f} values invalid"
+        finding.shown = f"{finding.figure:g} of {checked:,.0f} values are invalid"
         del finding.problems[6:], finding.notes[7:]
         return finding
 
