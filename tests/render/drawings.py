@@ -23,7 +23,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENES = sorted(
     path.relative_to(EXAMPLES).as_posix()
     for path in EXAMPLES.glob("*/*.json")
-    if "camera" in json.loads(path.read_text())  # a scene
+    if "scene" in json.loads(path.read_text())
     and path.parent.name != "polarizer"  # Mitsuba's film adds in arbitrary order
 )
 SPP = 24
