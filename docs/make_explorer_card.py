@@ -126,21 +126,35 @@ def page(stored: dict[str, Any]) -> str:
     """The report card, from the stored verdicts."""
     models = {name: one for name, one in stored.items() if not FACTOR.match(name)}
     factors = {name: one for name, one in stored.items() if FACTOR.match(name)}
-    lines = [INTRO, "## Models", "", *_table(models), "", "## Failures of models", ""]
+    lines = [INTRO, "## Models", "", *_table(models), "", "## Model failures", ""]
     for name, laws in models.items():
         for law, one in laws.items():
             if one["status"] == "fail":
                 cause = CAUSES.get((name, law)) or _follows(one) or CAUSES.get((name, "")) or one["cause"] or "unknown"
-                text = f"- **{name}**, {law}: {one['why']}. Effect: {one['size']}. Cause: {cause}"
+                text = f"- **{name}**, {law}: {_measured(one['why'])}. Effect: {_effect(one['size'])}. Cause: {cause}"
                 lines.append(textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False))
     lines += ["", "## Factors and visualizations", "", FACTORS, "", *_table(factors), "", AGAIN]
     return "\n".join(lines)
 
 
+def _measured(why: str) -> str:
+    """The measured violation as a clause."""
+    why = why.replace("albedo nan to nan; at most 0.001 is allowed", "the albedo is NaN")
+    why = re.sub(r"(^|: )inf; at most", r"\1the relative difference is infinite; at most", why)
+    why = re.sub(r"(^|: )([0-9.]+); at most", r"\1the relative difference is \2; at most", why)
+    return re.sub(r"^at ([^:]*): ", r"with \1, ", why)
+
+
+def _effect(size: str) -> str:
+    return {"wrong by 0 % on average, 0 % at worst": "none where values are finite", "inf": "infinite values"}.get(
+        size, size
+    )
+
+
 def _follows(one: dict[str, str]) -> str:
     """Cause of a failure that follows from the failure of another law, for example because of NaN."""
     match = re.fullmatch(r"follows from (\w+)'s", one["cause"])
-    return f"the failure of {match[1].lower()}." if match else ""
+    return f"the failure of the {match[1].lower()} law." if match else ""
 
 
 def _table(models: dict[str, Any]) -> list[str]:

@@ -73,7 +73,7 @@ def models() -> dict[str, type[BSDF]]:
 
 
 def is_model(name: str) -> bool:
-    """Whether a material class of this name exists, ignoring underscores, hyphens and case."""
+    """Whether a material class with this name exists. Underscores, hyphens and case are ignored."""
     return bool(_key(name))
 
 

@@ -113,7 +113,7 @@ def resume(
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write. None writes the output of the original request, if it named one. If this file is not in
+    output      file to write. None writes the output file named in the original request, if any. If this file is not in
                 the folder of the checkpoint, a file of the same name next to the checkpoint is written instead, with a
                 warning
     spp         total number of samples per pixel; None uses the number in the original request

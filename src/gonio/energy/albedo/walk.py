@@ -212,10 +212,11 @@ def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
 
 
 def albedo(base: Any, mu: float, walks: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """The albedo, a spectrum, as the mean weight with which walkers leave the surface, and its standard error.
+    """Estimate the albedo, a spectrum, as the mean weight of the walkers that leave the surface. Returns it with its
+    standard error.
 
     base   a Conductor or Dielectric with ndf "ggx"
-    mu     cosine between wo and the normal; if it is negative, walks start inside the glass
+    mu     cosine of the angle between wo and the normal; if it is negative, walks start inside the glass
     walks  number of walkers
     seed   seed of the walks
     """

@@ -40,7 +40,8 @@ def reflected_by_metal(cos_i: Scalar, eta: Spectrum, k: Spectrum) -> Diattenuati
 
 @function
 def reflected_by_glass(cos_i: Scalar, eta: Scalar) -> Diattenuation[Scalar]:
-    """Reflection at a real index, from either side; beyond the critical angle, only the phases differ."""
+    """Reflection at an interface with a real index, from either side. Beyond the critical angle, the s and p components
+    differ only in phase."""
     t = fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))
     return _reflected(cos_i, abs(t), safe_sqrt(t), safe_sqrt(-t))
 

@@ -101,7 +101,7 @@ class Targets:
         return axis, height, 2 * dr.pi * height
 
     def direction(self, origin: Point, pick: Float, u: Point) -> Vector:
-        """Sample a direction toward one of the spheres, uniformly in the cone of this sphere."""
+        """Sample a direction uniformly in the cone subtended by one of the spheres."""
         center, radius, _ = self._chosen(pick)
         axis, height, _ = self._cone(origin, center, radius)
         low = height * u.x
