@@ -16,7 +16,7 @@ MAX_NESTED = 16
 
 
 class Cell:
-    """The value of a variable and its id in the enclosing function. `partial` is true if parts of it may be undefined."""
+    """The value of a variable and its id in the enclosing function. `partial`: whether parts may be undefined."""
 
     __slots__ = ("id", "partial", "value")
 
