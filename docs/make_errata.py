@@ -65,8 +65,8 @@ scattering loses. It was replaced by the formula of Turquin's paper. **Computed*
 
 {table(headings, rows)}
 
-The thread's values of single scattering are confirmed. The formula of the paper multiplies the lobe by 1 / E; with an
-exact E, it therefore gives 1 everywhere. If the new term does the same with a tabulated E, the values in the table are
+The thread's values for single scattering are confirmed. The formula of the paper multiplies the lobe by 1 / E; with an
+exact E, it therefore gives 1 everywhere. If the new term does the same with a tabulated E, the tabulated values are
 too large by 6 % and 12 % in the last two rows. The [report card of three.js](report-cards/engines/three.md) confirms
 that they are too large, and shows how to correct the table.
 Try it: `gonio plot "turquin(base=metal)" --kind albedo`."""
@@ -226,7 +226,7 @@ def sheen() -> str:
         values = _quadrature(NeubeltSheen(alpha=roughness**2), cosines)
         rows.append([f"{roughness:g}", *(f"{value:.3f}" for value in values)])
     headings = ["roughness", *(f"n.v = {cosine:g}" for cosine in cosines)]
-    return f"""A curve that was fitted to the albedo of sheen had an average error of 62 % and was fitted again.
+    return f"""A curve that was fitted to the albedo of sheen had an average error of 62 % and was refitted.
 **Computed** albedo of white sheen, to which such a curve can be fitted (`NeubeltSheen` in `docs/make_errata.py`
 implements the formula as a short material):
 

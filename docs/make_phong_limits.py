@@ -214,8 +214,9 @@ The verifier therefore finds positive values of `eval` where the pdf is 0. {powe
 Remedy: use max(0, v.r), and never raise a number of unknown sign to a power.
 
 ## 2. Light from below the surface
-In this case n.l is negative, and the diffuse term subtracts light. The highlight also shines through the surface: r
-then points below the surface as well, but may still be close to the direction of a viewer near the horizon.
+If the light is below the surface, n.l is negative, and the diffuse term subtracts light. The highlight also shines
+through the surface: r then points below the surface as well, but may still be close to the direction of a viewer near
+the horizon.
 
 ![Reflected light as a function of the light angle, with and without a test of n.l](phong-limits/below.svg)
 
@@ -246,9 +247,9 @@ but n.l is not.
 
 ## 5. Small exponents cause hard edges
 A wide highlight does not fade out before the light reaches the horizon. If the viewer is at 70 degrees, the specular
-term is then still a large fraction of its peak (see the table); below the horizon, it is 0. The terminator is therefore
-a hard line. In addition, for p <= 1, the slope of (v.r)^p is discontinuous where v.r passes through 0, which causes a
-visible edge in the middle of the lit side.
+term for light at the horizon is still a large fraction of its peak (see the table); for light below the horizon,
+it is 0. The terminator is therefore a hard line. In addition, for p <= 1, the slope of (v.r)^p is discontinuous where
+v.r passes through 0, which causes a visible edge in the middle of the lit side.
 
 ![The highlight that ends at the horizon, and the edge where v.r = 0, for four exponents p](phong-limits/edge.svg)
 

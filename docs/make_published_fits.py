@@ -411,8 +411,8 @@ def networks(materials: list[Material]) -> str:
                 f"{image:.3f} / {rms(m.pictures[library.DEFAULT], m.pictures['network']):.3f}",
             )
         )
-    header = "material", "nearest fit", "distance of the nearest fit", "of Bagher's fit", "median of all fits"
-    return table((*header, "RMS difference, nearest / Bagher's"), rows)
+    header = "material", "nearest fit", "distance of the nearest fit", "distance of Bagher's fit"
+    return table((*header, "median distance of all fits", "RMS difference, nearest / Bagher's"), rows)
 
 
 def spreads(materials: list[Material], count: int) -> str:

@@ -105,7 +105,7 @@ def page(schema: dict[str, Any]) -> str:
         "## Materials",
         "A material has a `type` from the list below, the parameters of that type, and the keys that all materials",
         "share. `gonio explain NAME` prints the parameters. An image may take the place of a number or a color. A",
-        'material from a file is written as `{"type": TYPE, "file": ...}`. TYPE is `json` for a fit written by Gonio,',
+        'material from a file is written as `{"type": TYPE, "file": ...}`. TYPE is `json` (a fit written by Gonio),',
         "`gltf` or `materialx` ([documents](documents.md)), `measured` ([tables](measured.md)), or `shader`",
         "([shaders](shaders.md)). With `--allow-code`, `type` may also name a Python class, as `FILE.py:CLASS`.",
         "",

@@ -16,8 +16,8 @@ from ...ops import Direction, Mask, Mode, Spectrum
 class Sum(BSDF):
     """a + b: the sum of two materials, which is used in fits to measurements, such as "lambert+conductor" (Ngan2005).
 
-    The sum can reflect more light than it receives. It is sampled by a guide, a density tabulated from `eval`. A
-    material that consists only of a delta lobe is rejected, because its `eval` is 0.
+    The sum can reflect more light than it receives. Directions are sampled from a guide, a density tabulated from
+    `eval`. A material that consists only of a delta lobe is rejected, because its `eval` is 0.
     """
 
     a: BSDF = bsdf("the first material")

@@ -20,7 +20,7 @@ from ...optics.special import gauss
 
 GAIN_OF_TWO_WIDTHS, LOSS_OF_TWO_WIDTHS = 0.008, 0.01  # errors of interpolated tables, measured by benchmarks/energy.py
 INTERPOLATED = KnownViolation(
-    "tables for anisotropic bases are interpolated (benchmarks/energy.py)",
+    "tables for anisotropic bases are interpolated; benchmarks/energy.py measures the error",
     lambda model: GAIN_OF_TWO_WIDTHS if model.anisotropic else 0.0,
     certain=False,
 )

@@ -15,8 +15,8 @@ from ...optics.fresnel.artist import AVERAGES
 from ._compensated import GAIN_OF_TWO_WIDTHS, _Compensated, lobe_ratio
 
 COLORS = {
-    "sheet": "F_avg E_avg / (1 - F_avg (1 - E_avg)), as in the homework and in Kulla2017",
-    "bounce": "F_avg^2 E_avg / (1 - F_avg (1 - E_avg)): only light that is reflected twice or more",
+    "sheet": "F_avg E_avg / (1 - F_avg (1 - E_avg)), as in Homework 4 of GAMES202 and in Kulla2017",
+    "bounce": "F_avg^2 E_avg / (1 - F_avg (1 - E_avg)), which represents only light that is reflected twice or more",
 }
 
 
@@ -46,7 +46,7 @@ def f_add(lost: MissingEnergy, color: str) -> Spectrum:
 
 
 class KullaConty(_Compensated):
-    """f = f_base + f_add f_ms: the light lost by single scattering is restored by a broad lobe (Kulla2017).
+    """f = f_base + f_add f_ms: a broad lobe restores the light that single-scattering models lose (Kulla2017).
 
     E(mu) is the albedo of the base at F = 1 for mu = cos theta, with E_avg = 2 int E mu dmu and F_avg = 2 int F mu dmu.
     The lobe f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)) has the albedo 1 - E(mu_o), and its color f_add is
@@ -59,11 +59,11 @@ class KullaConty(_Compensated):
     side, whose albedos sum to 1 - E; their ratio follows from reciprocity (Kulla2017, p. 30).
 
     Any other base must be a finite isotropic lobe that only reflects; its albedo is computed once
-    (`compensation.measured`). E is then the albedo with F = 1 and with every color that represents a fraction of the
-    light set to 1, and F_avg is the ratio of the actual albedo to E. By this definition, Lambert loses no light, and
-    Oren-Nayar loses the interreflected light; a material without such colors, such as Phong, loses all light that its
-    brightest channel does not reflect. An energy gain of the base is not corrected. The parameters of such a base must
-    not vary over the surface, and no shader code is available.
+    (`compensation.measured`). E is then the albedo of the lossless variant of the base, in which F and every color
+    whose range ends at 1, such as an albedo, are 1, and F_avg is the ratio of the actual mean albedo to E_avg. By this
+    definition, Lambert loses no light, and Oren-Nayar loses the interreflected light; a material without such colors,
+    for example Phong, loses all light that its brightest channel does not reflect. An energy gain of the base is not
+    corrected. The parameters of such a base must not vary over the surface, and no shader code is available.
 
     With the masking term schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = 0.835 at roughness 0.05); the
     compensation then adds a spurious bright rim to smooth surfaces.
@@ -104,8 +104,8 @@ class KullaConty(_Compensated):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "gradients": KnownViolation(
-            "for a base without tables, the albedo is estimated anew for each parameter value, and samples that choose "
-            "another lobe may change E by 1e-4",
+            "for a base without tables, the albedo is estimated anew for each parameter value; samples that then "
+            "choose another lobe may change E by 1e-4",
             lambda model: 2.0 if model.needs_uniform else 0.0,
             certain=False,
         ),
@@ -115,7 +115,8 @@ class KullaConty(_Compensated):
             certain=False,
         ),
         "energy": KnownViolation(
-            "tables for rough glass and for anisotropic bases are interpolated (benchmarks/energy.py)",
+            "tables for rough glass and for anisotropic bases are interpolated; benchmarks/energy.py measures the "
+            "error",
             lambda model: _furnace_error(model),
             certain=False,
         ),

@@ -39,9 +39,9 @@ class Eon(BSDF):
     G = sin theta (theta - sin theta cos theta) + 2/3 (tan theta (1 - sin^3 theta) - sin theta)
     rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the color of light that bounces twice or more
 
-    Unlike `oren-nayar`, the model loses no light at rho = 1 for any roughness and angle, has no dark ring at
-    grazing angles, and becomes more saturated as roughness increases. It is reciprocal and is sampled by a mixture of a
-    clipped linearly transformed cosine and uniform directions (sec. 4 of the paper).
+    Unlike `oren-nayar`, the model loses no light at rho = 1 for any roughness and angle, has no dark ring at grazing
+    angles, and becomes more saturated as roughness increases. It is reciprocal. Directions are sampled from a mixture
+    of a clipped linearly transformed cosine and a uniform density (sec. 4 of the paper).
     """
 
     albedo: Colour = spectrum(default=0.5, doc="rho, the fraction of light reflected per bounce", low=0.0, high=1.0)

@@ -37,7 +37,7 @@ class OrenNayar(BSDF):
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"sigma": 0.0}, equals=lambda one: Lambert(one.albedo)),)
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "at grazing angles, the albedo A + B / 2 of the qualitative model is up to 1.015 (sigma = 0.2, albedo = 1)",
+            "at grazing angles, the albedo A + B / 2 of the qualitative model reaches 1.015 (sigma = 0.2, albedo = 1)",
             lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
             certain=False,  # below sigma = 0.04, the violation is less than a thousandth
         )

@@ -24,7 +24,7 @@ class ModifiedPhong(BSDF):
     v is wo, and r is wi mirrored about the normal; v.r is clamped to 0 (Lafortune1994). Because of the normalization
     factor, ks is the albedo of the lobe at normal incidence; toward grazing angles, part of the lobe lies below the
     surface and is lost. Energy is conserved if kd + ks <= 1. `phong` is Phong's original model, and `lafortune`
-    generalizes this one.
+    generalizes `modified-phong`.
     """
 
     kd: Colour = spectrum(default=0.5, doc="albedo of the diffuse component", low=0.0, high=1.0, soft_high=True)

@@ -34,11 +34,12 @@ class _Empirical(BSDF):
     limits: ClassVar[tuple[Limit, ...]] = (Limit({"ks": 0.0}, mutes=("p", "ka")), Limit({"kd": 0.0}, mutes=("ka",)))
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the specular term lacks the factor cos theta_i, so f contains it divided by cos theta_i",
+            "the specular term of `eval` lacks the factor cos theta_i, so the specular term of f is divided by "
+            "cos theta_i",
             lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
         ),
         "energy": KnownViolation(
-            "neither term is normalized: a diffuse term with kd = 1 reflects pi times the incident light",
+            "neither term is normalized; a diffuse term with kd = 1 reflects pi times the incident light",
             lambda model: np.max(np.pi * np.asarray(model.kd) + np.asarray(model.ks) * model._highlight_power()) - 1.0,
         ),
     }

@@ -21,11 +21,10 @@ from .glossy import _Glossy, facet, sum_breach
 class AshikhminShirley(_Glossy):
     """An anisotropic Phong model: f = diffuse term + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
 
-    p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)) is the density of h.
-    h is the half vector. The exponents n_x and n_y are given by `exponent`. By default, F is Schlick's approximation
-    with F0 = ((eta - 1) / (eta + 1))^2, as in the paper. The diffuse term is Lambertian or, if `coupled` is true, that
-    of the paper, which excludes the fraction F0 of the light and decreases toward grazing angles. The model is
-    reciprocal.
+    p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)) is the density of the half
+    vector h. The exponents n_x and n_y are given by `exponent`. By default, F is Schlick's approximation with
+    F0 = ((eta - 1) / (eta + 1))^2, as in the paper. The diffuse term is Lambertian or, if `coupled` is true, that of
+    the paper, which excludes the fraction F0 of the light and decreases toward grazing angles. The model is reciprocal.
 
     The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """

@@ -25,8 +25,8 @@ class CookTorrance(_Glossy):
     form (`conductor`), D includes the factor 1 / pi, and the denominator contains 4 instead of pi. The lobe is
     therefore four times as bright as that of a real surface with this distribution; for a real surface, set specular to
     1/4. Ngan2005 divides by pi once more. F is computed for a real index eta, without absorption; for a metal with
-    reflectance F0, set eta to (1 + sqrt(F0)) / (1 - sqrt(F0)). The model is reciprocal. It is sampled by the visible
-    normals of Beckmann's distribution with Smith masking.
+    reflectance F0, set eta to (1 + sqrt(F0)) / (1 - sqrt(F0)). The model is reciprocal. `sample` reflects wo about a
+    visible normal of Beckmann's distribution with Smith masking.
 
     The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
@@ -43,7 +43,7 @@ class CookTorrance(_Glossy):
     fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": sum_breach("D G / (pi cos cos) is four times the light that facets reflect, "),
+        "energy": sum_breach("D G / (pi cos cos) gives four times the light that facets reflect, and "),
     }
 
     def _most(self) -> np.ndarray:

@@ -119,10 +119,10 @@ class _Glossy(BSDF):
 def sum_breach(more: str = "") -> KnownViolation:
     """The violation of energy conservation by a sum of two terms.
 
-    more  a reason that concerns the lobe alone, placed before that of the sum
+    more  a reason that concerns the lobe alone, ending in ", and ", placed before the reason that concerns the sum
     """
     return KnownViolation(
-        f"{more}the diffuse and specular terms are added, and the total albedo may exceed 1",
+        f"{more}the diffuse and specular terms are added, so the total albedo may exceed 1",
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
         certain=False,  # the bound need not be reached
     )

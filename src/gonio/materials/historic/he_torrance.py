@@ -55,8 +55,8 @@ class HeTorrance(_Glossy):
     As in Ngan2005, F is computed for a real index and unpolarized light, and the coherent (mirror) term is omitted,
     because measured tables do not contain it. If g exceeds 18, D is the limit of the series,
     exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2), where h is the angle between the half vector and n. The
-    model is reciprocal. Lengths are in nm, but only their ratios matter. The model is sampled by the visible normals of
-    GGX with the width of the lobe at its peak.
+    model is reciprocal. Lengths are in nm, but only their ratios matter. `sample` reflects wo about a visible normal of
+    a GGX distribution that has the width of the lobe at its peak.
 
     The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
@@ -69,7 +69,7 @@ class HeTorrance(_Glossy):
     fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": sum_breach("toward grazing angles, G D grows faster than S falls, "),
+        "energy": sum_breach("toward grazing angles, G D grows faster than S falls, and "),
     }
 
     def reflectance(self, cos_theta: Scalar) -> Scalar:

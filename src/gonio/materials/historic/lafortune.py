@@ -26,7 +26,7 @@ class Lafortune(_Glossy):
     (Lafortune1997, eq. 4). C = (-1, -1, 1) gives the normalized Phong lobe about the mirror direction (Lafortune1994),
     which Ngan2005 calls Blinn-Phong. If cz is below 1, the lobe is tilted toward the horizon; positive cx and cy cause
     retro-reflection. The largest |C| should be 1, as in the normalization of Ngan2005, because the lobe scales with its
-    n-th power. The model is reciprocal. It is sampled by a power lobe about (cx o_x, cy o_y, cz o_z).
+    n-th power. The model is reciprocal. Directions are sampled from a power lobe about (cx o_x, cy o_y, cz o_z).
 
     The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """

@@ -22,7 +22,8 @@ class LowMicrofacet(_Glossy):
     """A microfacet model with a power-law D: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
 
     D = (1 + b (1 - n.h))^-c is not normalized, so `specular` includes the height of the peak of D. G is that of
-    V-grooves, and the factor 1 / pi is that of Cook1982. The model is reciprocal. It is sampled by the power law of D.
+    V-grooves, and the factor 1 / pi is that of Cook1982. The model is reciprocal. Half vectors are sampled with a
+    density proportional to D.
 
     The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
@@ -33,7 +34,7 @@ class LowMicrofacet(_Glossy):
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: Member = microfacet.fresnel_choice()
 
-    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("D is not normalized, ")}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("D is not normalized, and ")}
 
     def _most(self) -> np.ndarray:
         """16 specular m, where m = int D d(n.h): the weight of a sample is 8 specular m F G (o.h) / (n.o), and

@@ -41,8 +41,8 @@ class LowSmooth(_Glossy):
     Dp, the tangential component of o + i, is the deviation of the pair from mirror reflection. The lobe follows the
     power spectrum of polished surfaces (the ABC model; Church1990). F is evaluated at the cosine sqrt(1 - |q|^2 / 4),
     where q is the tangential component of o - i; for mirror reflection, this is the cosine of the angle of incidence.
-    The model is reciprocal. `specular` is not an albedo but the height of the peak divided by F, in 1/sr. The model is
-    sampled by the power law of the lobe, truncated near the rim of the disk of projected directions.
+    The model is reciprocal. `specular` is not an albedo but the height of the peak divided by F, in 1/sr. Dp is sampled
+    from the power law of the lobe, truncated near the rim of the disk of projected directions.
 
     The presets, named MATERIAL:PAPER/FIT, are published fits to materials in the MERL database.
     """
@@ -53,7 +53,9 @@ class LowSmooth(_Glossy):
     eta: Colour = spectrum(default=1.5, doc="refractive index, relative to the outside", low=1.0)
     fresnel: Member = microfacet.fresnel_choice()
 
-    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("the lobe is not normalized, ")}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": sum_breach("the lobe is not normalized, and "),
+    }
 
     def _most(self) -> np.ndarray:
         """`specular` times the lobe's integral over a disk of radius 2, the maximum of |Dp|."""

@@ -47,8 +47,8 @@ class ShiftedGamma(_Glossy):
     h is the angle between the half vector and n. The angle `reach` replaces the parameter c = reach^-k of the paper,
     which exceeds 1e100 in the published fits. D integrates to 1 if normalization = 1 / (alpha Gamma(1 - p, alpha)).
     Because all values are fitted, F can exceed 1 and, for f1 > f0, be negative; as published, G1 and the lobe can be
-    negative at the horizon. The model is reciprocal. It is sampled for the smallest and the largest alpha of the
-    channels, by a power law and an exponential that together approximate D to within a factor of e.
+    negative at the horizon. The model is reciprocal. Half vectors are sampled for the smallest or the largest alpha of
+    the channels, from a power law and an exponential that together approximate D to within a factor of e.
 
     The presets are the fits of Bagher2012 to the materials in the MERL database.
     """
@@ -65,7 +65,7 @@ class ShiftedGamma(_Glossy):
     theta0: Colour = spectrum(default=0.0, doc="angle at which masking begins", unit="rad")
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": sum_breach("F and G are fitted factors without bounds, "),
+        "energy": sum_breach("F and G are fitted factors without bounds, and "),
         "positivity": KnownViolation(
             "F is negative where f1 cos exceeds Schlick's curve, and G1 may be negative at the horizon",
             1.0,

@@ -32,7 +32,7 @@ class Ward(_Glossy):
     rotation: Angle = microfacet.rotation_angle()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        "energy": sum_breach("the lobe grows as 1 / sqrt(cos theta_o) toward grazing angles, "),
+        "energy": sum_breach("the lobe grows as 1 / sqrt(cos theta_o) toward grazing angles, and "),
     }
 
     @property

@@ -63,7 +63,7 @@ class _OpenPBR(BSDF):
         default=0.0, doc="fraction of the surface that is metal", low=0.0, high=1.0, off=0.0
     )
     specular_weight: Number = number(
-        default=1.0, doc="scale factor for F0 for the dielectric and of F for metal", low=0.0, high=4.0
+        default=1.0, doc="scale factor for F0 of the dielectric and for F of metal", low=0.0, high=4.0
     )
     specular_color: Colour = spectrum(
         default=1.0, doc="tint of the reflection from outside; for metal, the tint at the edge", low=0.0, high=1.0

@@ -37,7 +37,7 @@ from ..microfacet.dielectric import Dielectric
 from .interior import LayerTables, colour_of, colour_place, left_place, tables_of
 
 BOUNCES = {
-    "coloured": "the base color is applied at each bounce: the result is darker and more saturated than the base alone",
+    "coloured": "the base color is applied at each bounce, so the result is darker and more saturated than the base",
     "white": "the base color is applied once, as in most renderers, and is the color of the coated material",
 }
 ALMOST_ONE = 0.99999994  # the largest float32 below 1
@@ -77,7 +77,9 @@ class Coat(BSDF):
     }
     base: BSDF = bsdf("the material under the coat; it must not transmit")
     index: Number = number(default=1.5, doc="refractive index of the coat, relative to the outside", low=1.0, high=3.0)
-    alpha: Width = width_parameter(default=0.0, doc="width of the microfacets of the top surface; 0 is smooth")
+    alpha: Width = width_parameter(
+        default=0.0, doc="width of the microfacet distribution of the top surface; 0 is smooth"
+    )
     absorption: Colour = spectrum(
         default=0.0, doc="absorption coefficient; a crossing transmits exp(-absorption depth)", low=0.0
     )

@@ -24,9 +24,9 @@ class OpenPBR(_OpenPBR):
     f_base = M f_metal + (1 - M) {f_glossy + (1 - E_o) (1 - E_i) / (1 - E_avg) f_diffuse} for an opaque base
 
     F, C and M are the weights of fuzz, coat and metal, `opacity` is `geometry_opacity`, and f_X is the lobe of the
-    component X. Albedos are denoted by E: E_fuzz is that of the fuzz for wo, E_coat that of the coat's surface, E_o and
-    E_i are those of the base's rough dielectric surface for wo and wi, and E_avg is the cosine-weighted mean of E_o. T
-    is the color of the coat for the two crossings, along wo and wi, and D is the darkening by interreflection under the
+    component X. E_fuzz is the albedo of the fuzz for wo, E_coat is the albedo of the coat's surface, E_o and E_i are
+    the albedos of the base's rough dielectric surface for wo and wi, and E_avg is the cosine-weighted mean of E_o. T is
+    the color of the coat for the two crossings, along wo and wi, and D is the darkening by interreflection under the
     coat. W is the transmittance of the coat's surface for both crossings. Depending on `layering`, it is
     1 - E_coat(wo), as in the specification's reduction of layers to lobes, or a product of one factor per direction,
     which loses no light over a white base (docs/openpbr.md). f_diffuse is `eon`, f_fuzz is `sheen`, metal is F82 with
@@ -76,12 +76,14 @@ class OpenPBR(_OpenPBR):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(
-            "the fuzz depends on the view direction only, and so does a coat with layering `albedo`",
+            "the lobe and the attenuation of the fuzz depend on the view direction only, as does the attenuation by a "
+            "coat with layering `albedo`",
             lambda model: 4.0 if model.has("fuzz_weight") or model.by_albedo() else 0.0,
             certain=False,
         ),
         "energy": KnownViolation(
-            "the transmittance of layers is interpolated in isotropic tables, which approximate anisotropic layers",
+            "the transmittance of layers is interpolated in tables for isotropic layers, which only approximate "
+            "anisotropic ones",
             lambda model: 0.15 if model.any_anisotropic else 0.01,
             certain=False,
         ),
@@ -91,6 +93,6 @@ class OpenPBR(_OpenPBR):
             certain=False,
         ),
         "linearity": KnownViolation(
-            "the colors of layers are multiplied, and more than once for interreflected light", 10.0, certain=False
+            "the colors of layers are multiplied, more than once for interreflected light", 10.0, certain=False
         ),
     }

@@ -19,8 +19,8 @@ class Measured(BSDF):
     The supported formats are MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf),
     neural networks (.npz, as FILE.npz:NAME) and Gonio's .gonio; docs/measured.md describes each format. The data are
     not corrected: negative values remain negative, an albedo above 1 remains above 1, and a table that is not
-    reciprocal remains so. The material only reflects and is black from below. A table is sampled by the densities in
-    its file (RGL) or by a density computed from its values.
+    reciprocal remains so. The material only reflects and is black from below. Directions are sampled from the densities
+    in the file (RGL) or from a density computed from the table.
     """
 
     file: str = file(
@@ -35,10 +35,12 @@ class Measured(BSDF):
             certain=False,
         ),
         "reciprocity": KnownViolation(
-            "measured values are not corrected", lambda model: 0.0 if model.table.reciprocal else 2.0, certain=False
+            "measured values that are not reciprocal are not corrected",
+            lambda model: 0.0 if model.table.reciprocal else 2.0,
+            certain=False,
         ),
         "positivity": KnownViolation(
-            "negative measured values are not corrected (size relative to the largest value)",
+            "negative measured values, given relative to the largest value, are not corrected",
             lambda model: 1.0 if model.table.flaws.get("negative") else 0.0,
             certain=False,
         ),

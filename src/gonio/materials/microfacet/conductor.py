@@ -20,8 +20,8 @@ class Conductor(_Reflector):
     """A rough metal: f = albedo F D G / (4 (n.o)(n.i)) (Torrance1967; course sheet, eqs. 4 to 11).
 
     F is evaluated at the half vector. D, G and F are selected by `ndf`, `masking` and `fresnel`. If alpha is below
-    1e-4, the surface is a perfect mirror. Multiply scattered light is lost; at alpha = 1, this is more than half of the
-    light.
+    1e-4, the surface is a perfect mirror. Multiply scattered light, which is more than half of the light at alpha = 1,
+    is lost.
     """
 
     eta: Colour = spectrum(default=0.0, doc="real part of the refractive index, relative to the outside", low=0.0)

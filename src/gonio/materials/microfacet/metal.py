@@ -23,7 +23,7 @@ class Metal(_Reflector):
 
     f = albedo F D G / (4 (n.o)(n.i)), with F = r0 at normal incidence and F = 1 at 90 degrees. At 82 degrees, F is
     `edge` times the value of Schlick's approximation; edge = 1 therefore gives Schlick's approximation. OpenPBR uses
-    this model for metals. It has no refractive index, which thin films and polarization require; for these, use
+    this model for metals. `metal` has no refractive index, which thin films and polarization require; for these, use
     `conductor`.
     """
 

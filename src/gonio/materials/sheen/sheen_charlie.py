@@ -29,9 +29,9 @@ class SheenCharlie(BSDF):
 
     The softened terminator of the paper is omitted, because it is not reciprocal. There is no Fresnel term, and only
     single scattering is modeled: at normal incidence, the model reflects a fifth of the light at alpha = 1 and a
-    thousandth at alpha = 0.1. The remaining light reaches the cloth below, which is not part of this model. This is the
-    sheen of glTF, where alpha is the square of the sheen roughness. If alpha is below 0.07, the model reflects more
-    light than it receives near the horizon. It is sampled by a guide, a density tabulated from `eval`.
+    thousandth at alpha = 0.1. The remaining light reaches the cloth below, which is not part of this model. glTF uses
+    this model, with the square of the sheen roughness as alpha. If alpha is below 0.07, the model reflects more light
+    than it receives near the horizon. Directions are sampled from a guide, a density tabulated from `eval`.
     """
 
     albedo: Colour = spectrum(default=1.0, doc="scale factor for reflected light", low=0.0, high=1.0, soft_high=True)
@@ -39,7 +39,7 @@ class SheenCharlie(BSDF):
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": KnownViolation(
-            "for alpha below 0.07, the fit of Lambda gives too little masking, and the albedo exceeds 1 at 89 degrees",
+            "for alpha below 0.07, the fit of Lambda gives too little masking, so the albedo exceeds 1 at 89 degrees",
             lambda model: _gain(model),
             certain=False,
         )
