@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from ...material.bsdf import Limit
+import numpy as np
+
+from ...material.bsdf import BSDF, Limit
 from ...material.parameters import Colour, Number, choice, number, spectrum
-from ...ops import Scalar, Spectrum, function, ones_like
+from ...ops import Scalar, Spectrum, backend, function, ones_like
 from ...optics.fresnel import average as mean_over_angles
 from ...optics.fresnel import film
 from ...optics.fresnel.polarization import Diattenuation
@@ -31,8 +34,19 @@ def film_form() -> str:
 
 
 def bare(one: Conductor) -> Conductor:
-    """The metal without its film."""
-    return Conductor(**{name: getattr(one, name) for name in Conductor.parameters()})
+    """The metal without its film. If its indices vary with the wavelength, this is the metal under a film of index 1,
+    because F under a film is evaluated at all wavelengths, and that of `conductor` at three."""
+    values = {name: getattr(one, name) for name in Conductor.parameters()}
+    varies = any(backend.is_drjit(x) or np.ptp(np.asarray(x, float)) > 0.0 for x in (values["eta"], values["k"]))
+    return FilmConductor(**values, thickness=0.0, film_eta=1.0) if varies else Conductor(**values)
+
+
+def without_film(bare: Callable[[Any], BSDF]) -> tuple[Limit, ...]:
+    """The limits of a film: thickness 0 and index 1, both of which give the surface that `bare` returns."""
+    return (
+        Limit({"thickness": 0.0}, mutes=("film_eta",), equals=bare),
+        Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare),
+    )
 
 
 class FilmConductor(Conductor):
@@ -52,11 +66,12 @@ class FilmConductor(Conductor):
     film_eta: Number = film_index()
     form: str = film_form()
 
-    limits: ClassVar[tuple[Limit, ...]] = (
-        Limit({"thickness": 0.0}, mutes=("film_eta",), equals=bare),
-        Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare),
-    )
     reads_wavelengths: ClassVar[bool] = True
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:  # type: ignore[override]
+        """Both ways to remove the film; none for `belcour-barla`, which approximates its colors."""
+        return () if self.form == "belcour-barla" else without_film(bare)
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:

@@ -16,7 +16,7 @@ from ...optics.fresnel import average as mean_over_angles
 from ...optics.fresnel import film
 from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass
 from .dielectric import Dielectric, _Facet
-from .film_conductor import FRESNELS, film_form, film_index, thickness_number
+from .film_conductor import FRESNELS, film_form, film_index, thickness_number, without_film
 
 
 def bare(one: Dielectric) -> Dielectric:
@@ -41,10 +41,6 @@ class FilmDielectric(Dielectric):
     form: str = film_form()
 
     reads_wavelengths: ClassVar[bool] = True
-    limits: ClassVar[tuple[Limit, ...]] = (
-        Limit({"thickness": 0.0}, mutes=("film_eta",), equals=bare),
-        Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare),
-    )
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "delta": KnownViolation(
             "the reflectance is that of the coated interface, not the Fresnel reflectance for `eta` alone",
@@ -52,6 +48,11 @@ class FilmDielectric(Dielectric):
             certain=False,
         )
     }
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:  # type: ignore[override]
+        """Both ways to remove the film; none for `belcour-barla`, which approximates its colors."""
+        return () if self.form == "belcour-barla" else without_film(bare)
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
