@@ -27,7 +27,7 @@ def check_current_folder() -> None:
 
 
 def check_file(path: str | Path) -> Path:
-    """The file to be written, with symbolic links resolved. Raises InputError if it cannot be written there.
+    """The file to be written, with symbolic links resolved. Raises InputError if the file cannot be written.
 
     Called before a long computation, so that an unusable path is reported at once.
     """

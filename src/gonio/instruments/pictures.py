@@ -301,7 +301,7 @@ class Problem:
         return Settings("path", max_depth=self.depth, seed=seed)
 
     def render(self, numbers: Floats, spp: int | None = None, seed: int | None = None) -> Floats:
-        """Render the picture with the given parameters. For None, `spp` and `seed` are those of the fit."""
+        """Render the picture with the given parameters. If `spp` or `seed` is None, that of the fit is used."""
         self.put(numbers)
         render = Render(self.scene, self._settings(self.seed if seed is None else seed))
         render.advance(spp or self.spp)

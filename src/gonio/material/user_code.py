@@ -122,7 +122,7 @@ def files_in(text: str) -> list[Path]:
 
 
 def with_imports(path: Path) -> list[Path]:
-    """A Python file and the local files that it imports, recursively, because its behavior depends on all of them."""
+    """A Python file and, recursively, the local files that it imports, on all of which its behavior depends."""
     files: dict[Path, None] = {}
     waiting = [path]
     while waiting:

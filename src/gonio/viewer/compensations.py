@@ -21,7 +21,7 @@ def compensation(*models: MaterialLike, output: str | Path | None = None, sample
 
         go.compensation("mine.py:Compensation", samples=20_000)["rms"]["gold"]
 
-    models   additional materials: those with a base are compared as methods, all others are used as bases
+    models   additional materials: those with a base are compared as methods; all others are used as bases
     output   folder for a picture and a JSON file; None writes nothing
     samples  number of random walks per reference value
     Returns the dictionary that `gonio compensation --json` prints: `albedo` [material][method] at each `roughness` and

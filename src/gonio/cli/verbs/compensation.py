@@ -20,7 +20,7 @@ def compensation(
         list[str] | None,
         Argument(
             metavar="[MODEL]...",
-            help="Additional materials: those with a base are compared as methods, all others are used as bases.",
+            help="Additional materials: those with a base are compared as methods; all others are used as bases.",
             autocompletion=completion.materials,
         ),
     ] = None,

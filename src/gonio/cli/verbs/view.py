@@ -51,7 +51,8 @@ def view(
     ] = None,
     address: Address,
     homework: Annotated[
-        bool, Option("--homework", help="Show the two rows of homework 4, with the terms of its text and one light.")
+        bool,
+        Option("--homework", help="Show the two rows of homework 4, with the masking term of its text and one light."),
     ] = False,
     device: Device = "cpu",
     trust: Trust,
