@@ -42,8 +42,7 @@ def test_what_a_layered_model_switches_off_changes_nothing(name: str) -> None:
 
 def test_every_weight_and_thickness_of_a_model_has_a_limit() -> None:
     for name, model in models().items():
-        limits = model().limits if isinstance(model.limits, property) else model.limits  # a film's depend on its form
-        limited = {path for limit in limits for path in limit.values}
+        limited = {path for limit in model.limits for path in limit.values}
         for path, parameter in model.parameters().items():
             switch = parameter.off is not None or "thickness" in path or path.endswith("weight")
             if switch and path not in STRETCHES | COVERS | {"specular_weight"}:  # F0 never is exactly 0
@@ -61,3 +60,11 @@ def test_an_undeclared_weight_may_fade_out_but_not_jump() -> None:
     assert verdict.status == "pass" and "declares no `limits`" in verdict.notes[0]
     why = verify(LayerThatStartsWithAStep(), quick=True, law="limits")["limits"].why
     assert "0.1; at most 0.001 is allowed" in why[0]
+
+
+def test_a_film_on_a_colored_metal_has_limits_only_where_its_colors_are_exact() -> None:
+    gold = {"eta": (0.18, 0.42, 1.37), "k": (3.4, 2.3, 1.8), "alpha": 0.2, "thickness": 400.0}
+    exact = verify(go.FilmConductor(**gold), quick=True, law="limits")["limits"]
+    assert exact.status == "pass" and "2 declared limits" in exact.notes[0]
+    approximate = verify(go.FilmConductor(**gold, form="belcour-barla"), quick=True, law="limits")["limits"]
+    assert approximate.status == "pass" and "declares no `limits`" in approximate.notes[0]

@@ -225,7 +225,7 @@ def typed(parameter: Parameter, value: Value) -> object:
         name = value.strip().strip('"') if isinstance(value, str) else value
         # the distribution or masking term of a user
         family = getattr(parameter, "family", None)
-        return outside.member(name, None, where, family) if isinstance(name, str) and outside.names_code(name) else name
+        return outside.option(name, where, family) if isinstance(name, str) else name
     if parameter.kind == "flag":
         if str(value).lower() not in ("true", "false"):
             raise InputError(f"'{value}' given, true or false expected", where)

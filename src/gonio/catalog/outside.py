@@ -26,6 +26,7 @@ from ..material.user_code import (
     member,
     module_of,
     names_code,
+    option,
     place_of,
     thing,
     with_imports,
@@ -36,7 +37,7 @@ from . import shaders
 
 __all__ = [
     "PREFIX", "adopt", "as_material", "check_operators", "files_in", "forget", "is_outside", "load", "member",
-    "module_of", "names_code", "names_data", "probe", "reader_of", "thing", "with_imports",
+    "module_of", "names_code", "names_data", "option", "probe", "reader_of", "thing", "with_imports",
 ]  # fmt: skip
 
 

@@ -54,6 +54,15 @@ SceneFile = Annotated[
     ),
 ]
 Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
+Models = Annotated[
+    list[str] | None,
+    Option(
+        "--model",
+        "-m",
+        metavar="NAME",
+        help='Model to fit, such as "lambert+ggx"; repeatable; several models are ranked.',
+    ),
+]
 Outside = Annotated[bool, render_option("allow_outside")]
 Code = Annotated[bool, render_option("allow_code")]
 Device = Annotated[str, render_option("device")]

@@ -324,9 +324,8 @@ class BSDF(Material):
         """
         parameters = with_pair(cls.parameters(), parameters, cls.__name__)
         known = cls.presets()
-        by_name = {key.lower(): key for key in known} | {p.title.lower(): key for key, p in known.items()}
-        lower = str(name).lower()
-        key = by_name.get(lower, by_name.get("aluminum") if lower == "aluminium" else None)  # the British spelling
+        names = [(key, key) for key in known] + [(one, key) for key, p in known.items() for one in (p.title, *p.also)]
+        key = {one.lower(): key for one, key in names}.get(str(name).lower())
         if key is None:
             if not known:
                 raise InputError(f"{cls.name} has no presets", "preset", "give its parameters")

@@ -35,11 +35,13 @@ class Limit(NamedTuple):
     values  parameter name -> the number, within its range, that switches the part off
     mutes   patterns, as in `fnmatch`, for the names of parameters that then have no effect on `eval`
     equals  function that maps the model with these values to an equal model without the part; None if not stated
+    holds   function of the model that returns whether it has this limit; None if it always has
     """
 
     values: Mapping[str, float]
     mutes: tuple[str, ...] = ()
     equals: Callable[[Any], Any] | None = None
+    holds: Callable[[Any], bool] | None = None
 
 
 class Preset(NamedTuple):
@@ -48,11 +50,13 @@ class Preset(NamedTuple):
     title   the long name, such as "gold"
     values  parameter name -> value
     source  the reference for the values
+    also    other names by which it can be chosen
     """
 
     title: str
     values: Mapping[str, Value]
     source: str = ""
+    also: tuple[str, ...] = ()
 
 
 class Microsurface(NamedTuple):

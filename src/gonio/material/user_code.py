@@ -61,6 +61,14 @@ def member_name(value: object, where: str, family: members.Family[Any] | None = 
     return _added(value, where, family) if isinstance(getattr(value, "family", None), members.Family) else value
 
 
+def option(text: str | None, where: str, family: members.Family[Any] | None) -> str | None:
+    """The name of the member that an option specifies by name or as FILE.py:NAME, a file that is then run.
+
+    For `where` and `family`, see `member`.
+    """
+    return text if text is None or not names_code(text) else member(text, None, where, family)
+
+
 def _added(named: object, where: str, family: members.Family[Any] | None) -> str:
     own = members.family_of(named)
     if family is not None and own is not family:

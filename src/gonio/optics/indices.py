@@ -41,18 +41,19 @@ RGB_WAVELENGTHS = (650.0, 550.0, 450.0)  # nm
 
 
 class Metal(NamedTuple):
-    """A metal's name and complex index eta + i k at `RGB_WAVELENGTHS`, with the reference."""
+    """A metal's name and complex index eta + i k at `RGB_WAVELENGTHS`, with the reference and other names."""
 
     name: str
     eta: tuple[float, float, float]
     k: tuple[float, float, float]
     source: str
+    also: tuple[str, ...] = ()
 
 
 _PALIK = "Palik1998"
 METALS = {
     "Ag": Metal("silver", (0.15943, 0.14512, 0.13547), (3.9291, 3.1900, 2.3808), "Rakic1998"),
-    "Al": Metal("aluminum", (1.2464, 0.78941, 0.48922), (6.8523, 5.8519, 4.7783), "McPeak2015"),
+    "Al": Metal("aluminum", (1.2464, 0.78941, 0.48922), (6.8523, 5.8519, 4.7783), "McPeak2015", ("aluminium",)),
     "Au": Metal("gold", (0.18299, 0.42108, 1.3734), (3.4242, 2.3459, 1.7704), "Rakic1998"),
     "Cr": Metal("chromium", (3.1071, 3.1812, 2.3230), (3.3314, 3.3291, 3.1350), "Johnson1974"),
     "Cu": Metal("copper", (0.27105, 0.67693, 1.3164), (3.6092, 2.6248, 2.2921), "Rakic1998"),
@@ -180,10 +181,10 @@ def constants(name: str, location: str = "name") -> OpticalConstants:
     if not isinstance(name, str):
         raise InputError(f"{name!r} given, the name of a substance expected", location, "see go.indices()")
     text = name.strip()
-    known = {key.lower(): key for key in _constants()} | {metal.name: key for key, metal in METALS.items()}
-    lower = text.lower() if text.lower() != "aluminium" else "aluminum"
-    if lower in known:
-        return _constants()[known[lower]]
+    known = {key.lower(): key for key in _constants()}
+    known |= {name: key for key, metal in METALS.items() for name in (metal.name, *metal.also)}
+    if text.lower() in known:
+        return _constants()[known[text.lower()]]
     from . import index_database  # rarely used; the import takes 3 ms
 
     if text.startswith(index_database.PREFIX):

@@ -177,9 +177,7 @@ def _settings(scene: Settings, request: Request) -> Settings:
     """The settings of the scene, overridden by those of the request."""
     from ..transport.integrators.base import Integrator, check_sampler
 
-    chosen = request.integrator
-    if chosen is not None and user_code.names_code(chosen):
-        chosen = user_code.member(chosen, where="--integrator", family=Integrator.family)
+    chosen = user_code.option(request.integrator, "--integrator", Integrator.family)
     if chosen is not None:
         Integrator.family.get(chosen, "--integrator")
     if request.sampler is not None:

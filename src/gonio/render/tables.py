@@ -30,7 +30,7 @@ from ..energy.tables import ltc, ltc_anisotropic, prefilter
 from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
 from ..material import BSDF, is_model, model, models
-from ..members import Family
+from ..material.user_code import option
 from ..optics.masking import Masking
 from ..optics.ndf import NDF, distributions
 from ..owner import public
@@ -93,7 +93,7 @@ def bake(
     if preset is not None:
         return _preset(target, output, preset, 128 if resolution is None else resolution, seed, store, flip)
     folder = None if output is None else files.check_folder(output)
-    ndf, masking = _named(ndf, NDF.family, "--ndf"), _named(masking, Masking.family, "--masking")
+    ndf, masking = option(ndf, "--ndf", NDF.family), option(masking, "--masking", Masking.family)
     axes = {"resolution": resolution, "layout": layout, "aspect": aspect, "azimuths": azimuths}
     sampling = {"method": method, "samples": samples, "sampler": sampler, "seed": seed, "floor": floor}
     picture = {"store": store, "flip": flip, "wrap": wrap}
@@ -292,11 +292,6 @@ def _target(target: MaterialLike) -> str | BSDF:
         known = [*distributions(), *models()]
         raise InputError(f"unknown distribution or material '{name}'", "TARGET", did_you_mean(name, known))
     return notation.named(target)[0]
-
-
-def _named(text: str | None, family: Family[Any], option: str) -> str | None:
-    """The name of a distribution or masking term that is given by name or as FILE.py:CLASS."""
-    return outside.member(text, None, option, family) if text is not None and outside.names_code(text) else text
 
 
 def _own(target: str, name: str) -> str | BSDF:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from ..options import Fitting, Json, output_option
+from ..options import Fitting, Json, Models, output_option
 from ..output import Bar, print_intervals, print_warnings
 from .base import MATERIALS, verb
 
@@ -21,15 +21,6 @@ if TYPE_CHECKING:
 Photographs = Annotated[
     list[str],
     Argument(metavar="PHOTOS...", help="Folder with a calibration.json, or photographs that the calibration lists."),
-]
-Models = Annotated[
-    list[str] | None,
-    Option(
-        "--model",
-        "-m",
-        metavar="NAME",
-        help='Model to fit, such as "lambert+ggx"; repeatable; several models are ranked.',
-    ),
 ]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Exit, Option
 
 from ...errors import InputError
-from ..options import Fitting, Json, Options, Spp, output_option
+from ..options import Fitting, Json, Models, Options, Spp, output_option
 from ..output import Bar, listing, print_intervals, print_rich
 from .base import MATERIALS, verb
 
@@ -23,15 +23,7 @@ PICTURES = (".exr", ".hdr", ".png")
 class Model(Options):
     """The model that is fitted to measured values."""
 
-    model: Annotated[
-        list[str] | None,
-        Option(
-            "--model",
-            "-m",
-            metavar="NAME",
-            help='Model to fit, such as "lambert+ggx"; repeatable; several models are ranked.',
-        ),
-    ] = None
+    model: Models = None
     lobes: Annotated[int, Option(metavar="N", help="Number of copies of the model's last lobe.")] = 1
     loss: Annotated[str, Option(metavar="NAME", help="Loss to minimize: relative, log, log1p, cuberoot or linear.")] = (
         "relative"

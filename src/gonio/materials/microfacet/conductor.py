@@ -40,7 +40,7 @@ class Conductor(_Reflector):
     def presets(cls) -> Mapping[str, Preset]:
         """Metals by chemical symbol, with eta and k."""
         metals = indices.METALS.items()
-        return {symbol: Preset(m.name, {"eta": m.eta, "k": m.k}, m.source) for symbol, m in metals}
+        return {symbol: Preset(m.name, {"eta": m.eta, "k": m.k}, m.source, m.also) for symbol, m in metals}
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:

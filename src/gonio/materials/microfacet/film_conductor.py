@@ -42,10 +42,15 @@ def bare(one: Conductor) -> Conductor:
 
 
 def without_film(bare: Callable[[Any], BSDF]) -> tuple[Limit, ...]:
-    """The limits of a film: thickness 0 and index 1, both of which give the surface that `bare` returns."""
+    """The limits of a film: thickness 0 and index 1, both of which give the surface that `bare` returns. The colors of
+    `belcour-barla` are approximate, so it has none."""
+
+    def exact(one: Any) -> bool:
+        return bool(one.form != "belcour-barla")
+
     return (
-        Limit({"thickness": 0.0}, mutes=("film_eta",), equals=bare),
-        Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare),
+        Limit({"thickness": 0.0}, mutes=("film_eta",), equals=bare, holds=exact),
+        Limit({"film_eta": 1.0}, mutes=("thickness",), equals=bare, holds=exact),
     )
 
 
@@ -66,12 +71,8 @@ class FilmConductor(Conductor):
     film_eta: Number = film_index()
     form: str = film_form()
 
+    limits: ClassVar[tuple[Limit, ...]] = without_film(bare)
     reads_wavelengths: ClassVar[bool] = True
-
-    @property
-    def limits(self) -> tuple[Limit, ...]:  # type: ignore[override]
-        """Both ways to remove the film; none for `belcour-barla`, which approximates its colors."""
-        return () if self.form == "belcour-barla" else without_film(bare)
 
     @function
     def reflectance(self, cos_theta: Scalar) -> Spectrum:

@@ -40,6 +40,7 @@ class FilmDielectric(Dielectric):
     film_eta: Number = film_index()
     form: str = film_form()
 
+    limits: ClassVar[tuple[Limit, ...]] = without_film(bare)
     reads_wavelengths: ClassVar[bool] = True
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "delta": KnownViolation(
@@ -48,11 +49,6 @@ class FilmDielectric(Dielectric):
             certain=False,
         )
     }
-
-    @property
-    def limits(self) -> tuple[Limit, ...]:  # type: ignore[override]
-        """Both ways to remove the film; none for `belcour-barla`, which approximates its colors."""
-        return () if self.form == "belcour-barla" else without_film(bare)
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]

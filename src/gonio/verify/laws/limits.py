@@ -49,7 +49,7 @@ class Limits(Law):
         if not subject.has_density:
             raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         wo, wi = pairs(subject, effort.pairs // 8, seed, exact=True)
-        if not subject.model.limits:
+        if not _limits(subject):
             return _continuity(subject, wo, wi)
         return _finding(_cases(subject, wo, wi, seed), wo, wi)
 
@@ -96,6 +96,12 @@ class _Case(NamedTuple):
         return _row(self.other, row, len(self.error)), _row(self.one, row, len(self.error))
 
 
+def _limits(subject: Subject) -> list[Limit]:
+    """The declared limits that the model has with its choices."""
+    model = subject.model
+    return [limit for limit in model.limits if limit.holds is None or limit.holds(model)]
+
+
 def _finding(cases: list[_Case], wo: np.ndarray, wi: np.ndarray) -> Finding:
     if not cases:
         raise DoesNotApply("none of the declared limits can be tested at these parameter values")
@@ -125,7 +131,7 @@ def _cases(subject: Subject, wo: np.ndarray, wi: np.ndarray, seed: int) -> list[
     """The comparisons at all declared limits."""
     rng = np.random.default_rng([seed, 83])
     axes = {axis.path: axis for axis in ranges.axes(subject) if axis.path not in subject.model.fixed}
-    limits, count = subject.model.limits, len(wo)
+    limits, count = _limits(subject), len(wo)
     blocks = [_block(subject, axes, limit, rng, count) for limit in (*limits, Limit({}))]
     together = _in_blocks(subject, blocks)
     try:
@@ -264,7 +270,7 @@ def _changed(
 def _in_blocks(subject: Subject, blocks: list[dict[str, np.ndarray]]) -> Subject | None:
     """The subject with the values of all blocks one after the other, so that one kernel, with the code of all parts,
     serves them all; None if a parameter of a limit must not vary from ray to ray."""
-    if any(path not in blocks[0] for limit in subject.model.limits for path in limit.values):
+    if any(path not in blocks[0] for limit in _limits(subject) for path in limit.values):
         return None
     try:
         return box.per_ray_of(subject, {path: np.concatenate([one[path] for one in blocks]) for path in blocks[0]})
