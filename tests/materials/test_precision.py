@@ -31,6 +31,20 @@ def test_float32_is_close_to_float64(name: str) -> None:
         assert worst.max() < 5e-3
 
 
+@pytest.mark.parametrize(
+    "material",
+    [go.AshikhminShirley(coupled=True, specular=0.0), go.Dielectric(1.5, 0.6, masking="v-groove")],
+    ids=["coupled diffuse term", "v-grooves"],
+)
+def test_no_digits_are_lost_where_wo_grazes(material: go.BSDF) -> None:
+    cos = np.logspace(-6, -2, 60)
+    wo = np.stack([np.sqrt(1.0 - cos**2), np.zeros(60), cos], 1).astype(np.float32).astype(np.float64)
+    wi = np.broadcast_to(at(130.0 if material.transmits else 50.0, 180.0), wo.shape).astype(np.float32).astype(float)
+    exact = material.eval(wo, wi, precision="float64")
+    assert exact.min() > 0.0
+    assert relative(material.eval(wo, wi, precision="float32"), exact, 0.0).max() < 1e-5
+
+
 def test_transmission_near_the_critical_angle_keeps_its_digits_in_float32() -> None:
     # from inside, 1 - F vanishes with the transmitted cosine: taken from Snell's root, it would be off by 10 % here
     glass = go.Dielectric(1.5, 0.5)

@@ -182,6 +182,7 @@ def test_every_index_names_its_source_and_is_found_by_symbol_or_name() -> None:
         assert metal.source and len(metal.eta) == len(metal.k) == 3
         gold = [go.Conductor.preset(called) for called in (symbol.lower(), metal.name)]
         assert all((c.eta, c.k) == (metal.eta, metal.k) for c in gold)
+        assert all(indices.constants(name).name == symbol for name in (metal.name, *metal.also))
     assert go.Dielectric.preset("Water").eta == pytest.approx(1.333, abs=5e-4)
     with pytest.raises(InputError, match="unknown metal 'goldd'"):
         go.Conductor.preset("goldd")

@@ -169,6 +169,11 @@ def test_grades(average: float, worst: float, grade: Grade) -> None:
     assert Bias(worst, average, 1.0, "", "bias").grade is grade
 
 
+def test_an_effect_of_nothing_is_none() -> None:
+    assert Bias(0.0, 0.0, 0.0, "wo at 1 degree", "bias").words == "none"
+    assert "on average" in Bias(1e-9, 0.0, 0.0, "wo at 1 degree", "bias").words
+
+
 @pytest.mark.slow
 def test_the_report_holds_grades_and_a_sound_one_none() -> None:
     report = verify([Brighter(), go.Lambert(0.5)], law=["weight", "energy"])
