@@ -34,6 +34,11 @@ if TYPE_CHECKING:
 Member = TypeVar("Member")
 
 
+def with_article(kind: str) -> str:
+    """The kind of a member with its article: "a material", "an integrator"."""
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
+
+
 class Family(Generic[Member]):
     """The members of one family, by name.
 

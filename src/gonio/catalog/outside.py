@@ -31,6 +31,7 @@ from ..material.user_code import (
     thing,
     with_imports,
 )
+from ..members import with_article
 from ..ops import ForbiddenOperator, RecordingError
 from ..owner import exclusive
 from . import shaders
@@ -67,7 +68,7 @@ def as_material(cls: object) -> type[BSDF]:
     family = getattr(cls, "family", BSDF.family)
     if family is not BSDF.family or not isinstance(cls, type):
         hint = f"use it in a material: conductor(ndf=FILE.py:{getattr(cls, '__name__', 'NAME')})"
-        raise InputError(f"a {family.kind} given, a material class expected", place, hint)
+        raise InputError(f"{with_article(family.kind)} given, a material class expected", place, hint)
     if is_plugin(cls):
         name = "".join(f"-{c.lower()}" if c.isupper() else c for c in cls.__name__).lstrip("-")
         hint = f"register it by mi.register_bsdf('{name}', {cls.__name__}), then run gonio verify FILE.py:{name}"

@@ -48,6 +48,12 @@ def member(
     return _added(named, place_of(named), family)
 
 
+def absolute(text: str) -> str:
+    """FILE.py:NAME with an absolute path, for another process; any other string is returned unchanged."""
+    match = _CODE.fullmatch(text.strip())
+    return text if match is None else f"{Path(os.path.expanduser(match['file'])).absolute()}:{match['name']}"
+
+
 def member_name(value: object, where: str, family: members.Family[Any] | None = None) -> object:
     """The name of a member that a program passes: a class of a family or an instance of one, which is registered, or
     FILE.py:NAME, relative to the file of the calling line. Any other value is returned unchanged.
@@ -72,7 +78,8 @@ def option(text: str | None, where: str, family: members.Family[Any] | None) -> 
 def _added(named: object, where: str, family: members.Family[Any] | None) -> str:
     own = members.family_of(named)
     if family is not None and own is not family:
-        what = f"{getattr(named, '__name__', type(named).__name__)} is a {own.kind}, a {family.kind} expected"
+        name = getattr(named, "__name__", type(named).__name__)
+        what = f"{name} is {members.with_article(own.kind)}, {members.with_article(family.kind)} expected"
         raise InputError(what, where, "known: " + ", ".join(family.all()))
     return own.add(named, where)
 

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from ..catalog import notation
 from ..errors import InputError, summary
-from ..material import BSDF
+from ..material import BSDF, user_code
 from ..work.kept import Facts
 from .request import Request
 
@@ -34,6 +34,8 @@ def described(request: Request) -> Facts:
             continue
         if isinstance(value, Path):
             value = str(value.absolute()) if one.name == "output" or request.material is None else str(value)
+        if one.name == "integrator" and value is not None:
+            value = user_code.absolute(value)
         values[one.name] = _plain(value)
     return values
 
@@ -57,9 +59,7 @@ def request_of(given: Facts, where: str, allow_code: bool) -> Request:
     allow_code  whether materials may be classes in Python files; the file itself cannot grant this
     """
     if not allow_code and (given.get("allow_code") or ".py:" in json.dumps(given)):
-        raise InputError(
-            "this render runs Python files that its scene names", where, "add --allow-code if you trust it"
-        )
+        raise InputError("this render runs Python files", where, "add --allow-code if you trust it")
     values = vars(validated(_fields(), given, where, "/request"))
     try:
         material = _rebuilt(values["material"])
