@@ -5,9 +5,9 @@
 The materials are Gonio's own, with `pdf` and `sample` hidden. For each, PICTURES pictures of SAMPLES samples are
 rendered with independent random numbers. Printed is the variance of a pixel among the pictures, averaged over the ball:
 guided, relative to hand-written sampling. "furnace" is a ball under a white sky, lit by BSDF sampling only; "lit" is
-the shading ball with two lamps and a sky, by path tracing. Parentheses give the relative variance of hand-written
-sampling. A variance below FLOOR counts as FLOOR: at one sample per pixel, such noise is less than a step of an 8-bit
-picture.
+the ball of `gonio render MATERIAL` with its three lamps, by path tracing. Parentheses give the relative variance of
+hand-written sampling. A variance below FLOOR counts as FLOOR: at one sample per pixel, such noise is less than a step
+of an 8-bit picture.
 """
 
 from __future__ import annotations
