@@ -538,6 +538,9 @@ def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[st
     text = capsys.readouterr().out
     assert "alpha" in text and "Mitsuba plugin: gonio_conductor" in text
     assert "Source: src/gonio/materials/microfacet/conductor.py" in text
+    assert "alpha, >= 0 and <= 1, default 0.1" in text
+    assert gonio("explain", "coat") == 0
+    assert "bsdf, required" in " ".join(capsys.readouterr().out.split())
     assert gonio("explain", "phong") == 0
     assert "By design, this model violates the reciprocity law: " in capsys.readouterr().out
     assert "did you mean 'lambert'?" in failure(capsys, "explain", "lamberd")

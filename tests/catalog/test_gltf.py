@@ -194,6 +194,8 @@ BAD = {
     "picture of the network": (with_image(uri="//example.org/a.png"), "is not a file in its folder"),
     "picture without data": (with_image(), "/images/0/bufferView"),
     "no base64": (with_buffer(uri="data:;base64,###"), "not valid base64"),
+    "a data URI of text": (with_buffer(uri="data:application/octet-stream,AAAA"), "without ';base64,'"),
+    "a data URI without data": (with_buffer(uri="data:;base64"), "without ';base64,'"),
     "a buffer that lies": (with_buffer(uri="data:;base64,AAAA"), "a buffer of 36 bytes, but there are 3"),
     "cut off": (WHOLE[:-40], "but it has"),
     "a head alone": (WHOLE[:12], "not a glTF file"),

@@ -136,6 +136,12 @@ def test_holes_let_light_go_straight_on() -> None:
     np.testing.assert_allclose(model.eval(WO, WI), 0.3 * go.OpenPBR().eval(WO, WI), rtol=1e-5)
 
 
+def test_a_film_on_a_white_metal_reflects_no_more_than_arrives() -> None:
+    model = go.OpenPBR(base_color=1.0, base_metalness=1.0, specular_roughness=0.3, thin_film_weight=1.0)
+    found = go.albedo(model, mu=[0.2, 0.9], method="sampling", samples=1 << 12).value
+    assert np.all((found > 0.9) & (found < 1.01)), found
+
+
 @pytest.mark.slow
 def test_a_film_colours_what_is_reflected_and_its_opposite_what_goes_through() -> None:
     model = go.OpenPBR(thin_film_weight=1.0, thin_film_ior=2.0, transmission_weight=1.0, specular_roughness=0.1)

@@ -7,8 +7,9 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.material import guide_search
+from gonio.material import guide_search, tree
 from gonio.ops import backend, dot, exp, sqr, vec3, where
 from gonio.verify import verify
 
@@ -18,6 +19,21 @@ def hidden(material: go.BSDF, **facts: Any) -> go.BSDF:
     cls = type(material)
     names = {"pdf": go.BSDF.pdf, "sample": go.BSDF.sample, "__module__": __name__, **facts}
     return type("Hidden" + cls.__name__, (cls,), names)(**{n: getattr(material, n) for n in material.parameters()})
+
+
+def test_values_of_drjit_are_numbers_and_colors_of_numpy() -> None:
+    mi = engine.load()
+    given = go.Conductor(
+        eta=mi.Color3f(0.2, 0.9, 1.1),
+        k=mi.Color3f(mi.Float([1.0, 2.0]), 3.0, 4.0),
+        albedo=mi.Float(0.5),
+        alpha=mi.Float(0.3),
+    )
+    plain = tree.plain_values(given)
+    np.testing.assert_allclose(plain.eta, [0.2, 0.9, 1.1], rtol=1e-6)
+    np.testing.assert_allclose(plain.k, [[1.0, 3.0, 4.0], [2.0, 3.0, 4.0]])
+    assert isinstance(plain.albedo, float) and plain.albedo == 0.5
+    assert plain.alpha == pytest.approx((0.3, 0.3))
 
 
 class Retro(go.BSDF):

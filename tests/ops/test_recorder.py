@@ -16,6 +16,13 @@ def test_recorded_expression_computes() -> None:
     assert graph.evaluate(a=np.array([3.0]), b=np.array([4.0])) == pytest.approx([5.0])
 
 
+def test_channels_are_recorded_where_the_color_or_a_channel_is() -> None:
+    of_color = record(lambda c: ops.of_channels(c, [0.25, 0.5, 1.0]), types={"c": "spectrum"})
+    of_channel = record(lambda x: ops.of_channels(np.ones(3), [x, 2.0 * x, 1.0]), types={"x": "float"})
+    assert of_color.evaluate(c=np.ones((1, 3))).ravel() == pytest.approx([0.25, 0.5, 1.0])
+    assert of_channel.evaluate(x=np.array([0.25])).ravel() == pytest.approx([0.25, 0.5, 1.0])
+
+
 def test_every_word_records_and_computes_as_in_numpy() -> None:
     def words(x: Any, v: Any, w: Any, c: Any) -> Any:
         return (

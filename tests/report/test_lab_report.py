@@ -168,6 +168,15 @@ def test_what_a_page_cannot_show_is_an_error_with_its_line(text: str, what: str,
     assert error.value.where.endswith("report.md:3")
 
 
+def test_a_page_contains_its_pictures(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(b"a picture")
+    (tmp_path / "t.csv").write_text("a,b\n1,2\n")
+    page = document.page("![a](a.png)\n\n[t](t.csv)\n", tmp_path)
+    assert 'src="data:image/png;base64,YSBwaWN0dXJl"' in page and "<td>2</td>" in page
+    with pytest.raises(InputError, match=r"'t\.csv' is not a picture"):
+        document.page("![t](t.csv)\n", tmp_path)
+
+
 def test_a_picture_behind_a_link_out_of_the_folder_is_not_shown(tmp_path: Path) -> None:
     (tmp_path / "secret.png").write_bytes(b"x")
     (tmp_path / "report").mkdir()

@@ -7,6 +7,7 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
+from gonio.spirv import arithmetic
 
 WO, WI = np.array([[0.6, 0.0, 0.8]]), np.array([[0.0, -0.6, 0.8]])  # L.z = 0.8; NAN below is the root of -0.8
 NAN = "sqrt(-L.z)"
@@ -114,3 +115,9 @@ def test_what_would_have_another_value_is_refused(
 def test_a_function_that_returns_on_each_path_is_accepted(tmp_path: Path, body: str) -> None:
     text = f"fn BRDF(L: vec3f, V: vec3f, N: vec3f) -> vec3f {{ {body} }}"
     assert value(tmp_path, "wgsl", text) == pytest.approx(WI[0, 0], abs=1e-6)
+
+
+def test_vectors_of_unequal_sizes_are_not_added() -> None:
+    assert arithmetic.elementwise(arithmetic.add, (1.0, 2.0), 3.0) == (4.0, 5.0)
+    with pytest.raises(ValueError, match=r"vectors of \[2, 3\] components"):
+        arithmetic.elementwise(arithmetic.add, (1.0, 2.0), (3.0, 4.0, 5.0))

@@ -100,6 +100,13 @@ def test_a_fitted_width_of_each_channel_is_no_color() -> None:
     assert colored == {"diffuse"}
 
 
+def test_widths_and_wide_ranges_have_steps_of_equal_ratio() -> None:
+    film = {axis.path: axis for axis in ranges.axes(subject.of(go.material("film-conductor")))}
+    assert {path for path, axis in film.items() if axis.ratio} == {"alpha", "thickness"}  # 0 to 1 and 0 to 3000 nm
+    assert film["thickness"].at(0.0) == 0.0 and film["thickness"].at(0.5) == pytest.approx(30.0)
+    assert film["film_eta"].at(0.5) == 2.0
+
+
 def test_the_larger_of_two_exponents_is_the_narrower() -> None:
     report = verify(go.AshikhminShirley(), quick=True, law="isotropy")
     assert report.passed, str(report)

@@ -13,7 +13,7 @@ from gonio import ops
 from gonio.material import Sample, number
 from gonio.material.parameters import Value
 from gonio.ops import abs, dot, safe_div, sqr, vec3, where
-from gonio.optics import frame
+from gonio.optics import frame, warp
 from gonio.verify import verify
 from gonio.verify.forensics import channels, crowding, mixture
 from gonio.verify.laws import laws
@@ -250,6 +250,36 @@ def test_the_weights_of_lobes_are_named(mistake: type, words: str) -> None:
     assert held is not None
     found = mixture.named(subject, tested.cells, held, 1)
     assert (found is None) if not words else (found is not None and words in found.words), found
+
+
+class WrongSide(go.BSDF):
+    """The density states 0.5 for each side of the surface, of which samples choose the upper one with 0.7."""
+
+    @property
+    def transmits(self) -> bool:
+        return True
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return vec3(0.8, 0.8, 0.8) * self.pdf(wo, wi)
+
+    def pdf(self, wo: Any, wi: Any) -> Any:
+        return 0.5 * abs(wi.z) * ops.inv_pi
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+        up = warp.square_to_cosine_hemisphere(u.y, u.z)
+        wi = vec3(up.x, up.y, where(u.x < 0.7, up.z, -up.z))
+        return Sample.of_density(wi, vec3(0.8, 0.8, 0.8), self.pdf(wo, wi))
+
+
+def test_a_wrong_probability_of_the_sides_is_named() -> None:
+    subject = of(WrongSide())
+    (tested,) = pdf_law._chi_square(subject, pdf_law.FEW, 1, np.array([[0.6, 0.0, 0.8]]))
+    held = crowding.blocks(tested.cells)
+    assert held is not None
+    found = crowding.named(subject, tested.cells, held, 1)
+    assert found is not None and found.words.startswith(
+        "the ratio of samples to pdf is 1.4 above the surface and 0.6"
+    ), found
 
 
 def test_the_chi_square_tells_place_and_size() -> None:

@@ -12,7 +12,7 @@ import pytest
 from gonio import ops
 from gonio.errors import InputError
 from gonio.material import KnownViolation
-from gonio.verify import report, verify
+from gonio.verify import page, report, verify
 from gonio.verify.laws import Law, chosen
 from gonio.verify.run import decide
 from gonio.verify.subject import of
@@ -161,8 +161,6 @@ def test_a_stochastic_model_is_judged_by_its_expectations() -> None:
 
 
 def test_the_files_hold_everything_and_need_nothing(tmp_path: Path) -> None:
-    from gonio.verify import page
-
     found = verify(go.Lambert(0.3), quick=True, law=["reciprocity", "energy", "pdf", "precision", "shader"])
     page.write(found, tmp_path / "down")
     data = json.loads((tmp_path / "down/report.json").read_text())
@@ -178,6 +176,13 @@ def test_the_files_hold_everything_and_need_nothing(tmp_path: Path) -> None:
 def test_a_report_prints_as_the_terminal_shows_it() -> None:
     text = str(verify(go.Lambert(0.5), quick=True, law=["reciprocity"]))
     assert "reciprocity holds  quick" in text
+
+
+def test_a_tolerance_without_end_is_not_shown() -> None:
+    verdicts = [Verdict(9, "precision", "", PASS, 0.25, "0.25", tolerance) for tolerance in (1e-3, 0.0, np.inf)]
+    html = page.page(report.Report([Card(of(go.Lambert()), verdicts)], 1, "quick", 0, 0.01))
+    cells = [row.split("<td>")[-1].partition("<")[0] for row in html.split("<tr>") if "precision</a>" in row]
+    assert cells == ["1e-03", "0", ""]
 
 
 def _verdict(law: str, status: str) -> Verdict:
@@ -232,7 +237,5 @@ def test_a_branch_of_python_is_told_the_function_to_use_and_told_once() -> None:
 
 
 def test_a_page_begins_with_what_failed() -> None:
-    from gonio.verify import page
-
     html = page.page(verify(SlightlyBright(0.5), quick=True, law=["weight", "isotropy"]))
     assert html.index("<section id='c0-weight'>") < html.index("<table>") < html.index("<section id='c0-isotropy'>")
