@@ -28,6 +28,13 @@ def test_ks_is_the_lobe_s_albedo_from_the_normal_and_less_elsewhere() -> None:
     assert found[0] > found[1] > found[2] > 0.2
 
 
+def test_its_density_is_that_of_all_samples_above_the_surface() -> None:
+    w, weights = hemisphere(300, 200)
+    for exponent, angle, least in ((7.0, 0.0, 0.9999), (30.0, 40.0, 0.995), (7.0, 80.0, 0.6)):
+        density = PHONG(0.2, 0.5, exponent).pdf(np.broadcast_to(at(angle), w.shape), w, precision="float64")
+        assert density.min() >= 0.0 and least < float(weights @ density) < 1.0001
+
+
 def test_lafortune_s_lobe_about_the_mirror_is_the_same() -> None:
     other = go.model("lafortune")(0.3, 0.4, exponent=25.0)
     np.testing.assert_allclose(

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.measure import SAMPLE, compare, read, report
-from gonio.measure.formats import npz
+from gonio.measure.formats import npz, rgl
 from gonio.measure.formats.base import Format
 from gonio.measure.formats.merl import SCALE
 from gonio.measure.formats.npz import written
@@ -223,6 +223,14 @@ def test_a_tensor_of_endless_size_is_refused(files: dict[str, Path]) -> None:
     data[at - 8 : at] = struct.pack("<Q", 2**63)
     with pytest.raises(InputError, match="the file has"):
         formats()["rgl"].read(bytes(data), "x")
+
+
+@pytest.mark.parametrize("wavelengths", [(700.0, 550.0, 400.0), (400.0, 550.0, 550.0), (400.0, np.nan, 700.0)])
+def test_wavelengths_that_do_not_increase_are_refused(wavelengths: tuple[float, ...], files: dict[str, Path]) -> None:
+    fields = rgl.tensors(files["rgl"].read_bytes(), "x")
+    spectral = {**fields, "wavelengths": np.array(wavelengths, np.float32), "spectra": fields["rgb"]}
+    with pytest.raises(InputError, match="the wavelengths do not increase"):
+        formats()["rgl"].read(rgl.written(spectral), "x")
 
 
 def test_a_merl_file_without_a_valid_cell_is_refused(tmp_path: Path) -> None:

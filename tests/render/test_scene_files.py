@@ -55,6 +55,12 @@ def quad_ply(order: str, faces: bytes | None = None) -> bytes:
     return header + rows + (faces if faces is not None else struct.pack(sign + "B4i", 4, 0, 1, 2, 3))
 
 
+def test_only_a_reflection_reverses_the_faces() -> None:
+    corner = meshes.Triangles(np.eye(3), np.array([[0, 1, 2]]))
+    for scale, faces in (((0.5, 0.5, 0.5), [0, 1, 2]), ((2.0, 2.0, 2.0), [0, 1, 2]), ((-0.5, 1.0, 1.0), [2, 1, 0])):
+        assert corner.transformed(np.diag([*scale, 1.0])).faces.tolist() == [faces]
+
+
 def read(folder: Path, name: str, content: str | bytes) -> meshes.Triangles:
     path = folder / name
     path.write_bytes(content.encode() if isinstance(content, str) else content)
