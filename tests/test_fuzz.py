@@ -13,7 +13,7 @@ RENDERING = ("checkpoint", "scene-folder", "file-name", "environment")
 FEW = 3  # spoilt inputs a reader, beside what was found before
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_was_found_and_a_few_spoilt_inputs_more_are_survived(tmp_path: Path) -> None:
     """In a process of their own, which a find may bring down."""
     targets = [target for name, target in TARGETS.items() if name not in ("self-test", *RENDERING)]
