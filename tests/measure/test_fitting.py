@@ -416,7 +416,6 @@ def test_several_files_are_rows_and_a_bad_one_costs_only_its_own(tmp_path: Path)
     assert len(json.loads((tmp_path / "all.json").read_text())) == 3
 
 
-@pytest.mark.slow
 def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GONIO_CACHE", str(tmp_path / "cache"))
     for name in ("a", "b"):

@@ -233,6 +233,14 @@ def test_wavelengths_that_do_not_increase_are_refused(wavelengths: tuple[float, 
         formats()["rgl"].read(rgl.written(spectral), "x")
 
 
+@pytest.mark.parametrize("name", ["vndf", "luminance"])
+@pytest.mark.parametrize("factor", [0.0, -1.0])
+def test_a_density_without_light_is_refused(name: str, factor: float, files: dict[str, Path]) -> None:
+    fields = rgl.tensors(files["rgl"].read_bytes(), "x")
+    with pytest.raises(InputError, match=f"{name} is a density"):
+        formats()["rgl"].read(rgl.written({**fields, name: fields[name] * np.float32(factor)}), "x")
+
+
 def test_a_merl_file_without_a_valid_cell_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "dark.binary"
     path.write_bytes(struct.pack("<3i", 90, 90, 180) + np.full(3 * 90 * 90 * 180, -1.0).tobytes())

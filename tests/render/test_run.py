@@ -482,6 +482,22 @@ def test_an_error_that_a_notebook_remembers_does_not_come_back(scene: Path, tmp_
     assert go.render(scene, spp=1).shape == (16, 24, 3), caught
 
 
+@pytest.mark.parametrize(
+    ("others", "hint"),
+    [
+        ([], "give a folder, a .json or a .xml"),
+        (["wine.json"], "did you mean 'wine.json'?"),
+        ([f"scene{i}.json" for i in range(21)], "give a folder, a .json or a .xml"),
+    ],
+)
+def test_a_scene_that_is_missing_is_named_with_the_files_near_it(others: list[str], hint: str, tmp_path: Path) -> None:
+    for name in others:
+        (tmp_path / name).write_text("{}")
+    with pytest.raises(InputError) as caught:
+        go.render(tmp_path / "wime.json", spp=1)
+    assert caught.value.hint == hint
+
+
 # --- a finished picture is never lost ------------------------------------------------------------------
 
 

@@ -11,7 +11,8 @@ import pytest
 from gonio.catalog import notation
 from gonio.errors import InputError
 from gonio.material import models
-from gonio.viewer import curves, figures, fresnel_figure, lobes, plots
+from gonio.measure import SAMPLE, read
+from gonio.viewer import curves, figures, fit_figure, fresnel_figure, lobes, plots
 
 METAL = '{"type": "conductor", "preset": "Au", "alpha": 0.3}'
 
@@ -192,3 +193,21 @@ def test_a_long_subtitle_stays_inside_the_figure() -> None:
         for text in figure.texts:
             assert text.get_window_extent().x1 <= figure.bbox.x1 - 10.0
             assert text.get_window_extent().y0 >= figure.bbox.y1 - 0.85 * figure.dpi
+
+
+def test_the_figure_of_a_fit_shows_measured_and_fitted_values() -> None:
+    found = go.fit(read(SAMPLE), "lambert")
+    figure = fit_figure.draw(found, SAMPLE).figure
+    titles = [axes.get_title() for axes in figure.axes[:5]]
+    assert titles[:2] == ["measured, one light", "fitted, one light"] and titles[3] == "viewed at 20 degrees"
+    shown = np.asarray(figure.axes[1].images[0].get_array())[..., 0]
+    y, x = np.mgrid[1.0 : -1.0 : len(shown) * 1j, -1.0 : 1.0 : len(shown) * 1j]
+    normals = np.stack([x, y, np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))], -1)
+    cosines = normals @ (fit_figure.LIGHT / np.linalg.norm(fit_figure.LIGHT))
+    seen = (x * x + y * y < 0.9) & (shown > 0.1) & (shown < 0.99)  # neither in shadow nor clipped
+    ratio = shown[seen] ** 2.2 / cosines[seen]
+    assert seen.sum() > 1000 and np.ptp(ratio) < 0.01 * ratio.mean()
+    albedo = np.broadcast_to(found.material.albedo, 3)
+    for channel, line in enumerate(figure.axes[3].lines[1::2]):
+        angles, values = line.get_data()
+        np.testing.assert_allclose(values, albedo[channel] / np.pi * np.cos(np.radians(angles)), rtol=1e-4)
