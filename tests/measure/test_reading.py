@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.measure import SAMPLE, compare, read, report
-from gonio.measure.formats import npz, rgl
+from gonio.measure.formats import networks, npz, rgl
 from gonio.measure.formats.base import Format
 from gonio.measure.formats.merl import SCALE
 from gonio.measure.formats.npz import written
@@ -239,6 +239,23 @@ def test_a_density_without_light_is_refused(name: str, factor: float, files: dic
     fields = rgl.tensors(files["rgl"].read_bytes(), "x")
     with pytest.raises(InputError, match=f"{name} is a density"):
         formats()["rgl"].read(rgl.written({**fields, name: fields[name] * np.float32(factor)}), "x")
+
+
+def test_a_network_is_evaluated_at_the_centers_of_merls_cells() -> None:
+    """A network whose value is exp(1 + y) - 1, with y of the difference vector."""
+    weights = {
+        "kernel0": np.zeros((6, 21)), "bias0": np.zeros(21), "kernel1": np.eye(21), "bias1": np.zeros(21),
+        "kernel2": np.zeros((21, 3)), "bias2": np.zeros(3),
+    }  # fmt: skip
+    weights["kernel0"][4, 0] = weights["bias0"][0] = 1.0
+    weights["kernel2"][0] = 1.0
+    values, lit = networks.tabulated({name: part.astype(np.float32) for name, part in weights.items()})
+    theta_d, phi_d = np.radians(np.arange(90) + 0.5)[:, None], np.radians(np.arange(180) + 0.5)
+    expected = np.expm1(1.0 + np.sin(theta_d) * np.sin(phi_d))
+    np.testing.assert_allclose(values[40], np.broadcast_to(expected[..., None], (90, 180, 3)), rtol=1e-5)
+    theta_h = np.pi / 2 * (40.5 / 90) ** 2
+    above = np.cos(theta_h) * np.cos(theta_d) > np.abs(np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d))
+    np.testing.assert_array_equal(lit[40], above)
 
 
 def test_a_merl_file_without_a_valid_cell_is_refused(tmp_path: Path) -> None:

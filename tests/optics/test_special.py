@@ -91,6 +91,11 @@ def test_reflection_and_refraction_obey_the_law_of_the_plane_and_of_snell() -> N
     assert np.all(np.sum(t * m, 1) < 0)
 
 
+def test_the_azimuth_of_the_normal_is_that_of_x() -> None:
+    w = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.6, 0.0, 0.8], [0.0, -0.6, 0.8]])
+    np.testing.assert_allclose(frame.azimuth(_vector(w)).numpy().T, [[1, 0], [1, 0], [1, 0], [0, -1]], atol=1e-15)
+
+
 def test_rotating_back_undoes_a_rotation() -> None:
     w, turn = random_directions(100, 63), _vector(np.array([np.cos(0.7), np.sin(0.7)]))
     turned = frame.rotate(_vector(w), turn)

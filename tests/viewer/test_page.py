@@ -240,6 +240,16 @@ def test_a_scene_shows_its_materials_under_its_light(tmp_path: Path) -> None:
     assert light["direction"] == pytest.approx([0, 1, 0]) and light["irradiance"] == pytest.approx([2, 1, 0])
 
 
+def test_balls_share_a_shader_unless_their_formulas_differ(tmp_path: Path) -> None:
+    lamp = {"type": "spotLight", "position": [0, 2, 0], "energy": [8, 4, 0]}
+    gold = {"type": "gonio-conductor", "preset": "Au"}
+    others = [{"alpha": 0.3}, {"alpha": [0.1, 0.4]}, {"alpha": [0.1, 0.4], "rotation": 0.5}, {"ndf": "beckmann"}]
+    what = lab_scene.stage(
+        write_scene(tmp_path, [lamp], [ball(**gold, alpha=0.2), *(ball(**gold, **o) for o in others)])
+    )
+    assert [len(row.balls) for row in what.rows] == [2, 1, 1, 1] and len(what.materials) == 4
+
+
 def test_a_scene_is_turned_so_that_its_camera_looks_along_minus_z(tmp_path: Path) -> None:
     lamp = {"type": "spotLight", "position": [4, 0, 0], "energy": [16, 16, 16]}
     sky = {"type": "environmentLight", "radiance": [1, 1, 1]}
