@@ -49,6 +49,10 @@ BROKEN = {  # what is changed, and what the page says: where, what, remedy
     "fails when it is run": ("class Ward", "sqr(beta)\nclass Ward", "ward.py:8", "name 'beta' is not defined", ""),
     "fails in eval": ("half_vector(wo, wi)", "half_vector(wo)", "ward.py:16", "TypeError: ", "correct the formula"),
     "if on a value": ("        tan2", "        if h.z > 0: pass\n        tan2", "ward.py:18", "Python `if`", "where("),
+    "if on an array": (
+        "        tan2", "        if __import__('numpy').ones(2) > 0: pass\n        tan2",
+        "ward.py:18", "ambiguous", "where(",
+    ),
     "wrong kind": ("return where(above, ", "return above\n        (above, ", "ward.py:15", "eval returned a bool", ""),
     "unknown parameter": ("self.kd", "self.kdd", "ward.py:21", "no attribute 'kdd'", "correct the formula"),
     "out of range": ("number(0.3", "number(3.0", "ward.py", "3 given", ""),
