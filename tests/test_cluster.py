@@ -241,6 +241,10 @@ def test_a_cluster_that_cannot_be_is_one_clear_error(
         pass
 
 
+def test_a_cluster_counts_workers_that_have_not_started() -> None:
+    assert Cluster(workers=3).size == 3
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("greeting", [b"", b"HTTP/1.1 400 Bad Request\r\n"])
 def test_what_answers_and_is_no_scheduler_is_one_error(greeting: bytes, monkeypatch: pytest.MonkeyPatch) -> None:

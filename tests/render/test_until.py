@@ -255,6 +255,11 @@ def test_shares_follow_the_noise_and_cost_nothing() -> None:
     assert until.shares(np.zeros((8, 8)))[1] == 1.0
 
 
+def test_even_noise_is_shared_evenly_also_by_a_tile_with_few_pixels() -> None:
+    given, gain = until.shares(np.full((21, 17), 0.25))  # the last tile is not full
+    assert len(set(given.tolist())) == 1 and gain == pytest.approx(1.0)
+
+
 def test_a_bound_that_is_reached_first_is_told(scene: Path, tmp_path: Path) -> None:
     result = render_to_file(Request(scene, tmp_path / "a.exr", spp=20, until_error=1e-7))
     assert result.spp == 20 and result.stopped == "" and result.error is not None
